@@ -1,6 +1,6 @@
 //! Figures and reports, where there is a Python that draws them.
 
-use crate::test_directory::{SCENE, TestDirectory, square};
+use crate::test_directory::{SCENE, TestDirectory, sets, square};
 use std::process::Command;
 
 #[test]
@@ -136,7 +136,7 @@ fn a_body_without_damage_is_not_told_of_damage() {
     let (elastic, damage) = SCENE.split_once("[damage]").expect("a table");
     let (_, rest) = damage.split_once("[time]").expect("a table");
     directory.write("scene.toml", &format!("{elastic}[time]{rest}"));
-    let said = directory.run(&["--set", "time.step='auto'"]);
+    let said = directory.run(&sets(&["time.step='auto'", "output.times=[0.5]"]));
     assert!(said.out.contains("to t = 1 in steps that follow the loads"), "{}", said.out);
     assert!(!said.out.contains('ζ'), "{}", said.out);
     if directory.say_python(&["figures", "out/scene", "--animate"]).is_none() {

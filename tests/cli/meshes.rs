@@ -37,13 +37,6 @@ fn meshes_appear_beside_their_geo() {
     let files = ["fine.toml", "scene.toml", "square-size0.25.msh", "square.geo", "square.msh"];
     assert_eq!(test_directory.names("geo"), files);
     assert!(!test_directory.path("out").exists());
-
-    // A mesh that is there is kept.
-    let meshed =
-        |name| fs::metadata(test_directory.path(name)).and_then(|m| m.modified()).expect("a file");
-    let before = meshed("geo/square.msh");
-    assert_eq!(test_directory.say(&["mesh", "geo/scene.toml"]).code, Some(0));
-    assert_eq!(meshed("geo/square.msh"), before);
 }
 
 #[test]
@@ -63,43 +56,6 @@ fn a_change_in_an_included_file_is_meshed() {
     let later = SystemTime::now() + Duration::from_secs(10);
     fs::File::options().append(true).open(body).unwrap().set_modified(later).unwrap();
     assert!(meshed().len() > coarse.len());
-}
-
-#[test]
-fn run_meshes_what_is_missing() {
-    let test_directory = test_directory();
-    let said = test_directory.say(&["run", "geo/scene.toml", "--set", "time.end=0.1"]);
-    assert_eq!(said.code, Some(0), "{said:?}");
-    assert!(test_directory.path("geo/square.msh").exists());
-    assert!(test_directory.path("out/scene/summary.json").exists());
-}
-
-#[test]
-fn quadratic_displacements_have_a_mesh_of_their_own() {
-    let test_directory = test_directory();
-    let scene = SCENE.replace("square.msh", "square.geo");
-    let quadratic = format!("{scene}\n[discretisation]\ndisplacement = 2\n");
-    test_directory.write("geo/quadratic.toml", &quadratic);
-    assert_eq!(test_directory.say(&["mesh", "geo/scene.toml"]).code, Some(0));
-    let linear = test_directory.read("geo/square.msh");
-    let said = test_directory.say(&["mesh", "geo/quadratic.toml"]);
-    assert_eq!(said.code, Some(0), "{said:?}");
-    let files = ["quadratic.toml", "scene.toml", "square.geo", "square.msh", "square.order2.msh"];
-    assert_eq!(test_directory.names("geo"), files);
-    assert_eq!(test_directory.read("geo/square.msh"), linear);
-    assert!(test_directory.read("geo/square.order2.msh").len() > linear.len());
-
-    // The run takes the one that is there.
-    let run = |arguments: &[&str]| {
-        let arguments = [&["run", "geo/scene.toml", "--set", "time.end=0.1"], arguments].concat();
-        let said = test_directory.say(&arguments);
-        assert_eq!(said.code, Some(0), "{said:?}");
-        test_directory.summary("out/scene")
-    };
-    let [first, second] = [run(&[]), run(&["--set", "discretisation.displacement=2"])];
-    assert_eq!(test_directory.names("geo"), files);
-    assert_eq!(first["triangles"], second["triangles"]);
-    assert!(first["nodes"].as_u64() < second["nodes"].as_u64());
 }
 
 #[test]

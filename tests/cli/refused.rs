@@ -140,10 +140,6 @@ fn gmsh_missing_or_failing() {
     let test_directory = changed("square.msh", "square.geo");
     test_directory.write("square.geo", "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n");
     refused(&test_directory, &[], &["square.geo: gmsh could not mesh it", "line 2"]);
-    test_directory
-        .say(&["mesh", "scene.toml"])
-        .fails(2, &["square.geo: gmsh could not mesh it", "line 2"]);
-
     let before = test_directory.everything();
     for arguments in [["run", "scene.toml"], ["mesh", "scene.toml"]] {
         let said = ProgramOutput::of(test_directory.command(&arguments).env("PATH", ""));

@@ -1,69 +1,35 @@
 //! Adapted meshes: the accuracy asked for is the accuracy got, with few triangles.
 
-use crate::support::{run, square};
-use signorini::{
-    contact::SOLVERS,
-    estimate::{self, Adapted},
-    evolution::DiscreteProblem,
-    mesh::Mesh,
-    petsc::Session,
-    scene::Scene,
-};
-use std::{collections::BTreeMap, path::Path};
+use crate::support::{adapted, scene, solved, square, with_part};
+use signorini::{estimate::Adapted, mesh::Mesh, scene::Scene};
 
-/// A block on a foundation that ends under it: u ~ r^½ at the end, a jump of the traction besides.
-fn scene(accuracy: f64) -> Scene {
-    loaded(accuracy, "-1")
-}
-
-/// The same under another load per area.
-fn loaded(accuracy: f64, load: &str) -> Scene {
-    let text = format!(
+/// A block under a load per area, on a foundation that ends under it: u ~ r^½ at the end, a jump of the traction besides.
+fn block(accuracy: f64, load: &str) -> Scene {
+    scene(&format!(
         "accuracy = {accuracy}
-         mesh.file = 'given.msh'
          material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
          boundary = [
             {{ name = 'left', symmetry = true }},
             {{ name = 'half', gap = 0 }},
             {{ name = 'top', traction = ['0', '{load}'] }},
          ]"
-    );
-    Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+    ))
 }
 
-/// The unit square, of whose bottom the first half is a curve of its own.
-fn mesh(n: usize) -> Mesh {
-    let mut mesh = square(n);
-    let mut half = mesh.curves["bottom"].clone();
-    half.edges.retain(|edge| edge.iter().all(|&node| mesh.nodes[node][0] <= 0.5));
-    mesh.curves = BTreeMap::from([
-        ("half".to_owned(), half),
-        ("left".to_owned(), mesh.curves["left"].clone()),
-        ("top".to_owned(), mesh.curves["top"].clone()),
-    ]);
-    mesh
-}
-
-fn adapted(accuracy: f64) -> Adapted {
-    let session = Session::start(&[]).unwrap();
-    let mut triangles = 0;
-    let mut seen = |mesh: &Adapted| triangles = mesh.mesh.triangles.len();
-    let found =
-        estimate::adapted(&session, &scene(accuracy), mesh(2), SOLVERS[0], accuracy, &mut seen);
-    let found = found.unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(triangles, found.mesh.triangles.len(), "the last mesh shown is the answer");
-    found
+/// The unit square, of whose bottom the first half is a curve.
+fn mesh() -> Mesh {
+    with_part(square(2), "bottom", "half", |[x, _]| x <= 0.5)
 }
 
 /// fᵀu on a mesh: with a gap of zero fᵀu = ‖u‖², and ‖u − u_h‖² ≤ ‖u‖² − ‖u_h‖², the difference of
 /// twice the energies.
 fn work(mesh: Mesh) -> f64 {
-    let problem = DiscreteProblem::new(scene(0.1), mesh).unwrap_or_else(|error| panic!("{error}"));
-    run(&problem, SOLVERS[0]).last.record.work
+    solved(block(0.1, "-1"), mesh).last.record.work
 }
 
 #[test]
 fn the_error_is_at_most_the_one_asked_for_and_not_much_less() {
+    let adapted = |accuracy| adapted(&block(accuracy, "-1"), mesh(), accuracy);
     let exact = work(adapted(3e-3).mesh);
     let mut triangles = Vec::new();
     for accuracy in [0.1, 0.03, 0.01] {
@@ -83,13 +49,9 @@ fn the_error_is_at_most_the_one_asked_for_and_not_much_less() {
 fn a_load_narrower_than_the_first_triangles_is_found() {
     // ∫ exp(−((x − c)/w)²) dx = w √π.
     let (width, accuracy) = (0.004, 0.1);
-    let scene = loaded(accuracy, &format!("-exp(-((x - 0.31)/{width})^2)"));
-    let session = Session::start(&[]).unwrap();
-    let found = estimate::adapted(&session, &scene, mesh(2), SOLVERS[0], accuracy, &mut |_| {});
-    let mesh = found.unwrap_or_else(|error| panic!("{error}")).mesh;
-    drop(session);
-    let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
-    let force = run(&problem, SOLVERS[0]).last.record.contact_force;
+    let narrow = || block(accuracy, &format!("-exp(-((x - 0.31)/{width})^2)"));
+    let mesh = adapted(&narrow(), mesh(), accuracy).mesh;
+    let force = solved(narrow(), mesh).last.record.contact_force;
     let exact = width * std::f64::consts::PI.sqrt();
     assert!((force - exact).abs() < accuracy * exact, "{force} is not {exact}");
 }
@@ -98,21 +60,16 @@ fn a_load_narrower_than_the_first_triangles_is_found() {
 fn a_slender_body_reaches_every_accuracy_in_few_rounds() {
     // Of a bent strip all triangles have much the same error: either all are too large or none is by much.
     for accuracy in [0.1, 0.07, 0.05, 0.03, 0.02, 0.01] {
-        let text = format!(
+        let strip = scene(&format!(
             "accuracy = {accuracy}
-             mesh.file = 'given.msh'
              material = {{ young = 2e5, poisson = 0, plane = 'stress' }}
              boundary = [
                 {{ name = 'left', displacement = [0, 0] }},
                 {{ name = 'right', traction = [0, -0.1] }},
              ]"
-        );
-        let scene =
-            Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
-        let session = Session::start(&[]).unwrap();
-        let strip = Mesh::rectangle(50.0, 1.0, 4, 1);
-        let found = estimate::adapted(&session, &scene, strip, SOLVERS[0], accuracy, &mut |_| {});
-        let Adapted { mesh, rounds, error, short, .. } = found.unwrap_or_else(|e| panic!("{e}"));
+        ));
+        let Adapted { mesh, rounds, error, short, .. } =
+            adapted(&strip, Mesh::rectangle(50.0, 1.0, 4, 1), accuracy);
         println!("{accuracy}: {error:.5}, {} triangles, mesh {rounds}", mesh.triangles.len());
         assert!(short.is_none() && error <= accuracy && rounds <= 15, "{short:?}, mesh {rounds}");
     }

@@ -1,26 +1,19 @@
 //! Error bars: a figure is off by no more than its bar, and the bar is no idle one.
 
-use crate::support::{run, square};
+use crate::support::{adapted, scene, solved, square};
 use signorini::{
     contact::SOLVERS,
     estimate::{self, Adapted},
     evolution::{DiscreteProblem, Outcome},
-    mesh::Mesh,
     petsc::Session,
     problem::Bar,
     scene::Scene,
 };
-use std::path::Path;
-
-fn scene(text: &str) -> Scene {
-    Scene::parse(text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
-}
 
 /// A block that is clamped on the left, pressed on top, and rests on a foundation below.
 fn block(order: u8, more: &str, gap: &str, load: &str) -> Scene {
     scene(&format!(
         "{more}
-         mesh.file = 'given.msh'
          discretisation.displacement = {order}
          material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
          boundary = [
@@ -29,17 +22,6 @@ fn block(order: u8, more: &str, gap: &str, load: &str) -> Scene {
             {{ name = 'top', traction = ['0', \"{load}\"] }},
          ]"
     ))
-}
-
-fn solved(scene: Scene, mesh: Mesh) -> Outcome {
-    let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
-    run(&problem, SOLVERS[0])
-}
-
-fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
-    let session = Session::start(&[]).unwrap();
-    let found = estimate::adapted(&session, scene, mesh, SOLVERS[0], accuracy, &mut |_| {});
-    found.unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// work, displacement_max and contact_force.

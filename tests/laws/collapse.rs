@@ -1,11 +1,7 @@
 //! Bodies that lose their support: the time follows from equilibrium by hand.
 
-use crate::support::{moved, problem, run};
-use signorini::{
-    contact::SOLVERS,
-    evolution::DiscreteProblem,
-    mesh::{Curve, Mesh},
-};
+use crate::support::{moved, problem, run, with_part};
+use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
 
 /// A scene on `mesh`, with time from 0 to 1 in steps of `step`.
 fn scene(mesh: Mesh, step: &str, conditions: &str) -> DiscreteProblem {
@@ -15,14 +11,6 @@ fn scene(mesh: Mesh, step: &str, conditions: &str) -> DiscreteProblem {
          {conditions}"
     );
     problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// `mesh` with the edges of the curve `of` whose nodes fulfil a condition as another curve, `name`.
-fn with_part(mut mesh: Mesh, of: &str, name: &str, is_in: impl Fn([f64; 2]) -> bool) -> Mesh {
-    let edges = mesh.curves[of].edges.iter().copied();
-    let edges: Vec<_> = edges.filter(|edge| edge.iter().all(|&i| is_in(mesh.nodes[i]))).collect();
-    mesh.curves.insert(name.to_owned(), Curve { edges, ..Curve::default() });
-    mesh
 }
 
 /// `motion` is the beginning of its name: where a body may slide, the height of the point of rest is arbitrary.

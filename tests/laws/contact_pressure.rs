@@ -1,7 +1,7 @@
 //! The contact pressure as a field on Γ_C: uniform and linear pressures keep their values, the area under it is the
 //! force of each foundation.
 
-use crate::support::{close_to, distorted, moved, problem, run, shipped, square, turn};
+use crate::support::{close_to, distorted, moved, problem, run, shipped, square, turn, with_part};
 use signorini::{
     contact::SOLVERS,
     evolution::{ContactRow, DiscreteProblem, State},
@@ -21,16 +21,10 @@ fn area(rows: &[ContactRow]) -> f64 {
     pairs.map(|p| 0.5 * (p[0].pressure + p[1].pressure) * (p[1].arc_length - p[0].arc_length)).sum()
 }
 
-/// `mesh` whose bottom is two curves, "near" the left and "far" from it.
-fn divided(mut mesh: Mesh, at: f64) -> Mesh {
-    let bottom = mesh.curves.remove("bottom").unwrap();
-    for (name, is_near) in [("near", true), ("far", false)] {
-        let mut part = bottom.clone();
-        part.edges
-            .retain(|edge| edge.iter().all(|&node| mesh.nodes[node][0] < at + 1e-9) == is_near);
-        mesh.curves.insert(name.to_owned(), part);
-    }
-    mesh
+/// `mesh` with two more curves, "near" the left end of its bottom and "far" from it.
+fn divided(mesh: Mesh, at: f64) -> Mesh {
+    let near = with_part(mesh, "bottom", "near", |[x, _]| x < at + 1e-9);
+    with_part(near, "bottom", "far", |[x, _]| x > at - 1e-9)
 }
 
 #[test]

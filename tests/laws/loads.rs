@@ -1,8 +1,8 @@
 //! Nodal loads against the integrals they stand for.
 
 use crate::support::{
-    ORDERS, close, curved, curved_area, difference, distorted, history, moved, problem, square,
-    turn,
+    ORDERS, close, curved, curved_area, difference, distorted, history, layered, moved, problem,
+    square, turn,
 };
 use signorini::{
     contact::SOLVERS,
@@ -33,44 +33,25 @@ fn whole(body: &Body, edges: &[[usize; 2]]) -> impl Iterator<Item = (Edge, [f64;
 }
 
 #[test]
-fn quadratic_tractions_are_integrated_exactly() {
-    // On the top, y = 1: f = (1 − 2x + 6x², 3x²).
+fn quadratic_tractions_and_affine_body_forces_are_integrated_exactly() {
     for order in ORDERS {
         let body = Body::new(distorted(5), order);
-        let mut load = vec![0.0; 2 * body.nodes.points.len()];
+        let zero = vec![0.0; 2 * body.nodes.points.len()];
+        let check = |load: &[f64], expected: [[f64; 3]; 2]| {
+            let found = moments(&body, load);
+            let pairs = found.as_flattened().iter().zip(expected.as_flattened());
+            pairs.for_each(|(value, expected)| close(*value, *expected, 1e-14));
+        };
+        // On the top, y = 1: f = (1 − 2x + 6x², 3x²). ∫f_x = 1 − 1 + 2, ∫x f_x = 1/2 − 2/3 + 6/4; ∫f_y = 1, ∫x f_y = 3/4.
+        let mut load = zero.clone();
         let f = |[x, _]: [f64; 2], _| [1.0 - 2.0 * x + 6.0 * x * x, 3.0 * x * x];
         add_traction(&body, whole(&body, &body.mesh.curves["top"].edges), f, &mut load);
-        let [horizontal, vertical] = moments(&body, &load);
-        // ∫f_x = 1 − 1 + 2, ∫x f_x = 1/2 − 2/3 + 6/4; ∫f_y = 1, ∫x f_y = 3/4.
-        for (value, expected) in horizontal.into_iter().zip([2.0, 4.0 / 3.0, 2.0]) {
-            close(value, expected, 1e-14);
-        }
-        for (value, expected) in vertical.into_iter().zip([1.0, 0.75, 1.0]) {
-            close(value, expected, 1e-14);
-        }
-    }
-}
-
-#[test]
-fn affine_body_forces_are_integrated_exactly() {
-    // f = (2 − x + 3y, 6y) on the square.
-    for order in ORDERS {
-        let body = Body::new(distorted(5), order);
-        let mut load = vec![0.0; 2 * body.nodes.points.len()];
-        add_body_force(
-            &body,
-            &TriangleParts::default(),
-            |_, [x, y]| [2.0 - x + 3.0 * y, 6.0 * y],
-            &mut load,
-        );
-        let [horizontal, vertical] = moments(&body, &load);
-        // ∫xy = 1/4, ∫x² = 1/3.
-        for (value, expected) in horizontal.into_iter().zip([3.0, 17.0 / 12.0, 1.75]) {
-            close(value, expected, 1e-14);
-        }
-        for (value, expected) in vertical.into_iter().zip([3.0, 1.5, 2.0]) {
-            close(value, expected, 1e-14);
-        }
+        check(&load, [[2.0, 4.0 / 3.0, 2.0], [1.0, 0.75, 1.0]]);
+        // f = (2 − x + 3y, 6y) on the square. ∫xy = 1/4, ∫x² = 1/3.
+        let mut load = zero;
+        let f = |_, [x, y]: [f64; 2]| [2.0 - x + 3.0 * y, 6.0 * y];
+        add_body_force(&body, &TriangleParts::default(), f, &mut load);
+        check(&load, [[3.0, 17.0 / 12.0, 1.75], [3.0, 1.5, 2.0]]);
     }
 }
 
@@ -362,9 +343,6 @@ fn the_units_of_a_narrow_load_do_not_matter() {
 #[test]
 fn gravity_pulls_on_each_material_by_its_density() {
     for degree in [1, 2] {
-        let mut mesh = square(4);
-        let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
-        mesh.surfaces.insert("upper".to_owned(), (0..mesh.triangles.len()).filter(upper).collect());
         let text = format!(
             "discretisation.displacement = {degree}
              material = {{ young = 1, poisson = 0, plane = 'stress', density = 2, upper.density = 5 }}
@@ -372,7 +350,7 @@ fn gravity_pulls_on_each_material_by_its_density() {
              body = {{ force = [0, 1], gravity = ['10*sin(t)', '-10*cos(t)'] }}
              boundary = [{{ name = 'bottom', displacement = [0, 0] }}]"
         );
-        let problem = crate::support::problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+        let problem = problem(layered(square(4)), &text).unwrap_or_else(|e| panic!("{e}"));
         for t in [0.0, 0.5, 1.0_f64] {
             let [x, y, moment] = resultant(&problem, t);
             let (gx, gy) = (10.0 * t.sin(), -10.0 * t.cos());

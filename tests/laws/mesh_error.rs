@@ -1,20 +1,16 @@
 //! The measured error of the damage against the true one.
 
-use crate::support::{problem, run, square};
+use crate::support::{problem, run, scene, square};
 use signorini::{
     contact::SOLVERS,
     estimate::{self, Measured},
     evolution::Outcome,
     petsc::Session,
-    scene::Scene,
 };
-use std::path::Path;
 
 /// The measured errors of a scene on a square of n × n cells.
 fn measured(text: &str, n: usize) -> Measured {
-    let text = format!("mesh.file = 'square.msh'\n{text}");
-    let scene = Scene::parse(&text, Path::new("law.toml"), &[]).unwrap();
-    let session = Session::start(&[]).unwrap();
+    let (scene, session) = (scene(text), Session::start(&[]).unwrap());
     estimate::measured_errors(&session, &scene, &square(n), SOLVERS[0], None).unwrap()
 }
 

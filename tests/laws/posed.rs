@@ -2,9 +2,9 @@
 //! are pressed in, pressures, loads that jump.
 
 use crate::support::{
-    close_to, difference, distorted, history, largest, moved, problem, run, square, turn,
+    close_to, difference, distorted, history, largest, layered, moved, problem, run, square, turn,
 };
-use signorini::{contact::SOLVERS, evolution::Step, mesh::Mesh};
+use signorini::{contact::SOLVERS, evolution::Step};
 
 const YOUNG: f64 = 200.0;
 const POISSON: f64 = 0.3;
@@ -165,15 +165,6 @@ fn chosen_steps_do_not_pass_over_a_pulse() {
     }
 }
 
-/// A square of cells, its triangles above y = ½ the physical surface `upper`.
-fn layered(n: usize) -> Mesh {
-    let mut mesh = square(n);
-    let height = |t: &usize| mesh.triangles[*t].iter().map(|&i| mesh.nodes[i][1]).sum::<f64>();
-    let upper = (0..mesh.triangles.len()).filter(|t| height(t) > 1.5).collect();
-    mesh.surfaces = [("upper".to_owned(), upper)].into();
-    mesh
-}
-
 #[test]
 fn two_layers_are_compressed_each_as_its_material_is() {
     // ν/E of both is the same, and with it ε_xx; strains are recovered exactly on both sides.
@@ -187,7 +178,7 @@ fn two_layers_are_compressed_each_as_its_material_is() {
              boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
                          {{ name = 'top', pressure = {p} }}]"
         );
-        let problem = problem(layered(8), &text).unwrap_or_else(|e| panic!("{e}"));
+        let problem = problem(layered(square(8)), &text).unwrap_or_else(|e| panic!("{e}"));
         let outcome = run(&problem, SOLVERS[0]);
         let exact = |&[x, y]: &[f64; 2]| {
             let below = y.min(0.5) / young[0] + (y - 0.5).max(0.0) / young[1];
@@ -208,7 +199,7 @@ fn surfaces_that_cover_the_body_are_the_body() {
              boundary = [{{ name = 'left', displacement = [0, 0] }}, {{ name = 'bottom', gap = 0 }},
                          {{ name = 'top', pressure = '3*t' }}]"
         );
-        let mut mesh = layered(6);
+        let mut mesh = layered(square(6));
         let lower = |t: &usize| !mesh.surfaces["upper"].contains(t);
         let lower = (0..mesh.triangles.len()).filter(lower).collect();
         mesh.surfaces.insert("lower".to_owned(), lower);
@@ -247,7 +238,7 @@ fn each_layer_is_damaged_by_its_own_law() {
          time = { end = 0.1, step = 0.1 }
          boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
                      { name = 'top', gap = -0.02 }]";
-    let problem = problem(layered(6), text).unwrap_or_else(|e| panic!("{e}"));
+    let problem = problem(layered(square(6)), text).unwrap_or_else(|e| panic!("{e}"));
     let last = run(&problem, SOLVERS[0]).last;
     close_to(1.0 - last.record.zeta_mean, 0.1 * 0.5 * 4e-4 * 200.0, 1e-9);
     let at = |y: f64| {
@@ -264,7 +255,7 @@ fn surfaces_that_the_mesh_does_not_have_or_that_overlap_are_refused() {
             "material = {{ young = 1, poisson = 0, plane = 'stress', {surfaces} }}
              boundary = [{{ name = 'left', displacement = [0, 0] }}]"
         );
-        let mut mesh = layered(2);
+        let mut mesh = layered(square(2));
         mesh.surfaces.insert("all".to_owned(), (0..8).collect());
         problem(mesh, &text).expect_err("refused").to_string()
     };

@@ -1,15 +1,12 @@
 //! A flat punch on a half-plane: the exact square-root pressure, at the rate of smooth solutions.
 
-use crate::support::{order, run, square};
+use crate::support::{adapted, order, run, scene, square, with_part};
 use signorini::{
     contact::SOLVERS,
-    estimate,
     evolution::DiscreteProblem,
-    mesh::Mesh,
-    petsc::Session,
     scene::{Expression, Scene},
 };
-use std::{collections::BTreeMap, f64::consts::PI, path::Path};
+use std::f64::consts::PI;
 
 /// Half the width of the punch, m.
 const WIDTH: f64 = 0.5;
@@ -75,9 +72,8 @@ impl HalfPlane {
     /// tractions.
     fn scene(&self) -> Scene {
         let [xx, yy, xy] = &self.stress;
-        let text = format!(
-            "mesh.file = 'given.msh'
-             discretisation.displacement = 2
+        scene(&format!(
+            "discretisation.displacement = 2
              material = {{ young = {YOUNG}, poisson = {POISSON}, plane = 'stress' }}
              boundary = [
                 {{ name = 'left', symmetry = true }},
@@ -85,20 +81,8 @@ impl HalfPlane {
                 {{ name = 'right', traction = ['{xx}', '{xy}'] }},
                 {{ name = 'top', traction = ['{xy}', '{yy}'] }},
              ]"
-        );
-        Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+        ))
     }
-}
-
-/// The unit square, of whose bottom the first half is the punch.
-fn mesh() -> Mesh {
-    let mut mesh = square(8);
-    let mut punch = mesh.curves["bottom"].clone();
-    punch.edges.retain(|edge| edge.iter().all(|&node| mesh.nodes[node][0] <= WIDTH));
-    let sides = ["left", "right", "top"].map(|name| (name.to_owned(), mesh.curves[name].clone()));
-    mesh.curves = BTreeMap::from(sides);
-    mesh.curves.insert("punch".to_owned(), punch);
-    mesh
 }
 
 #[test]
@@ -106,11 +90,8 @@ fn the_pressure_under_a_punch_comes_at_the_rate_of_smooth_solutions() {
     let exact = HalfPlane::new();
     let (mut unknowns, mut strains, mut pressures) = (Vec::new(), Vec::new(), Vec::new());
     for accuracy in [0.03, 0.01, 3e-3] {
-        let session = Session::start(&[]).unwrap();
-        let found =
-            estimate::adapted(&session, &exact.scene(), mesh(), SOLVERS[0], accuracy, &mut |_| {});
-        let mesh = found.unwrap_or_else(|error| panic!("{error}")).mesh;
-        drop(session);
+        let first = with_part(square(8), "bottom", "punch", |[x, _]| x <= WIDTH);
+        let mesh = adapted(&exact.scene(), first, accuracy).mesh;
         let problem = DiscreteProblem::new(exact.scene(), mesh).unwrap();
         let last = run(&problem, SOLVERS[0]).last;
         // With a gap of zero fᵀu = ‖u‖² in the energy norm, and ‖u − u_h‖² ≤ ‖u‖² − ‖u_h‖².

@@ -1,6 +1,6 @@
 //! Strains recovered from displacements, and the error that they tell.
 
-use crate::support::{ORDERS, distorted, problem, run, square, unstructured};
+use crate::support::{ORDERS, distorted, layered, problem, run, square, unstructured};
 use signorini::{
     contact::SOLVERS,
     estimate::RecoveredStrains,
@@ -94,10 +94,7 @@ fn in_layers_one_triangle_thick_the_estimate_is_near_the_error() {
                 {{ name = 'top', traction = [0, -0.002] }},
              ]"
         );
-        let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
-        let upper = (0..mesh.triangles.len()).filter(upper).collect();
-        mesh.surfaces.insert("upper".to_owned(), upper);
-        let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+        let problem = problem(layered(mesh), &text).unwrap_or_else(|e| panic!("{e}"));
         let outcome = run(&problem, SOLVERS[0]);
         (outcome.last.record.work, outcome.errors.displacement_mesh)
     };

@@ -1,14 +1,18 @@
 //! Rigid motions: which are prevented, which only contact resists, which the load drives.
 
-use crate::support::{close, difference, distorted, largest, moved, problem, run, square, turn};
+use crate::{
+    bore::disc,
+    support::{
+        close, difference, distorted, largest, moved, problem, run, square, turn, with_part,
+    },
+};
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{RigidMotions, Row, SOLVERS, nonnegative},
     evolution::{DiscreteProblem, SetupError},
     fem::{Body, RigidMotion},
-    mesh::{Curve, Mesh, Order, Refinement},
+    mesh::{Mesh, Order, Refinement},
 };
-use std::collections::BTreeMap;
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
@@ -40,14 +44,9 @@ fn driven(order: u8, mesh: Mesh, boundaries: &str) -> String {
 /// The square with two more curves: the parts of the top and the bottom within `foot` and
 /// `load` in x.
 fn footed(foot: [f64; 2], load: [f64; 2]) -> Mesh {
-    let mut mesh = square(10);
-    for (name, whole, [from, to]) in [("foot", "bottom", foot), ("load", "top", load)] {
-        let middle = |e: &&[usize; 2]| 0.5 * (mesh.nodes[e[0]][0] + mesh.nodes[e[1]][0]);
-        let within = |e: &&[usize; 2]| from < middle(e) && middle(e) < to;
-        let edges = mesh.curves[whole].edges.iter().filter(within).copied().collect();
-        mesh.curves.insert(name.into(), Curve { edges, other_edges: 0 });
-    }
-    mesh
+    let within = |[from, to]: [f64; 2]| move |[x, _]: [f64; 2]| from - 1e-9 < x && x < to + 1e-9;
+    let mesh = with_part(square(10), "bottom", "foot", within(foot));
+    with_part(mesh, "top", "load", within(load))
 }
 
 #[test]
@@ -211,24 +210,13 @@ fn an_axis_leaves_the_translation_along_it() {
     }
 }
 
-/// A disc of radius 1 around (3, 2) as a regular polygon of 16 corners, and with curved sides.
+/// A disc of radius 1 around (3, 2) as a regular polygon, and with curved sides.
 fn discs() -> [Mesh; 2] {
-    let corners = 16;
-    let point = |i: usize| {
-        let (s, c) = (std::f64::consts::TAU * i as f64 / corners as f64).sin_cos();
-        [3.0 + c, 2.0 + s]
-    };
-    let edges: Vec<_> = (0..corners).map(|i| [1 + i, 1 + (i + 1) % corners]).collect();
-    let mesh = Mesh {
-        nodes: std::iter::once([3.0, 2.0]).chain((0..corners).map(point)).collect(),
-        triangles: edges.iter().map(|&[a, b]| [0, a, b]).collect(),
-        curves: BTreeMap::from([("rim".to_owned(), Curve { edges, other_edges: 0 })]),
-        ..Mesh::default()
-    };
+    let mesh = disc(18, 0.0, 1);
     let mut round = mesh.clone();
-    for &[a, b] in &mesh.curves["rim"].edges {
+    for &[a, b] in &mesh.curves["rim0"].edges {
         // The sagitta 1 − cos(π/n), outwards.
-        let sagitta = 1.0 - (std::f64::consts::PI / corners as f64).cos();
+        let sagitta = 1.0 - (std::f64::consts::PI / 18.0).cos();
         round.set_offset([a, b], mesh.edge_normal([a, b]).0.map(|normal| sagitta * normal));
     }
     [mesh, round]
@@ -240,7 +228,7 @@ fn a_disc_in_a_ring_can_only_turn() {
     let [mesh, round] = discs();
     for condition in ["symmetry = true", "gap = 0"] {
         for (order, mesh) in [(1, &mesh), (2, &mesh), (2, &round)] {
-            let rim = format!("{{ name = 'rim', {condition} }}");
+            let rim = format!("{{ name = 'rim0', {condition} }}");
             let problem = of_order(order, mesh.clone(), &rim).unwrap_or_else(|e| panic!("{e}"));
             let motions = &problem.motions;
             let names: Vec<_> = motions.free.iter().map(RigidMotion::to_string).collect();
@@ -282,7 +270,7 @@ fn a_disc_refined_on_one_side_still_turns_in_its_ring() {
     }
     for condition in ["symmetry = true", "gap = '0.001*(1 + x - 3)'"] {
         let load = "body.force = [1, 0]\n";
-        let rim = format!("boundary = [{{ name = 'rim', {condition} }}]");
+        let rim = format!("boundary = [{{ name = 'rim0', {condition} }}]");
         let text = format!("{load}discretisation.displacement = 2\n{MATERIAL}\n{rim}");
         let problem = problem(refined.mesh.clone(), &text).unwrap_or_else(|e| panic!("{e}"));
         let [free] = &problem.motions.free[..] else { panic!("{:?}", problem.motions.free) };

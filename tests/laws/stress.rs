@@ -2,7 +2,8 @@
 //! discontinuous where materials meet.
 
 use crate::support::{
-    ORDERS, bent, close, distorted, largest, moved, order, problem, run, square, unstructured,
+    ORDERS, bent, close, distorted, largest, layered, moved, order, problem, run, square,
+    unstructured,
 };
 use signorini::{
     contact::SOLVERS,
@@ -154,11 +155,9 @@ fn nodal_stresses_of_a_ring_under_pressure_converge_to_those_of_lame() {
 #[test]
 fn where_two_materials_meet_each_has_its_own_stress() {
     for degree in [1, 2] {
-        let mut mesh = distorted(6);
         // The interface is straight.
-        mesh = moved(mesh, |[x, y]| [x, if (y - 0.5).abs() < 0.06 { 0.5 } else { y }]);
-        let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
-        mesh.surfaces.insert("upper".to_owned(), (0..mesh.triangles.len()).filter(upper).collect());
+        let straight = |[x, y]: [f64; 2]| [x, if (y - 0.5).abs() < 0.06 { 0.5 } else { y }];
+        let mesh = layered(moved(distorted(6), straight));
         let text = format!(
             "discretisation.displacement = {degree}
              material = {{ young = {YOUNG}, poisson = 0, plane = 'stress', upper.young = 100 }}

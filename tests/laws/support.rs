@@ -6,9 +6,10 @@ mod common;
 pub use common::{Random, curved_area, square};
 
 use signorini::{
-    estimate,
+    contact::SOLVERS,
+    estimate::{self, Adapted},
     evolution::{DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
-    mesh::{self, Mesh, Order},
+    mesh::{self, Curve, Mesh, Order},
     model::DamageLaw,
     petsc::Session,
     scene::Scene,
@@ -99,11 +100,48 @@ pub fn turn(angle: f64, [x, y]: [f64; 2]) -> [f64; 2] {
     [c * x - s * y, s * x + c * y]
 }
 
+/// `mesh` with the edges of the curve `of` whose nodes fulfil a condition as another curve, `name`.
+pub fn with_part(mut mesh: Mesh, of: &str, name: &str, is_in: impl Fn([f64; 2]) -> bool) -> Mesh {
+    let edges = mesh.curves[of].edges.iter().copied();
+    let edges: Vec<_> = edges.filter(|edge| edge.iter().all(|&i| is_in(mesh.nodes[i]))).collect();
+    mesh.curves.insert(name.to_owned(), Curve { edges, ..Curve::default() });
+    mesh
+}
+
+/// `mesh` with its triangles above y = ½ as the physical surface `upper`.
+pub fn layered(mut mesh: Mesh) -> Mesh {
+    let upper = |t: &usize| mesh.triangles[*t].iter().all(|&node| mesh.nodes[node][1] >= 0.5);
+    let upper = (0..mesh.triangles.len()).filter(upper).collect();
+    mesh.surfaces.insert("upper".to_owned(), upper);
+    mesh
+}
+
+/// The scene `text` on a mesh that is given later.
+pub fn scene(text: &str) -> Scene {
+    let text = format!("mesh.file = 'given.msh'\n{text}");
+    Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The mesh of an accuracy, from a first one.
+pub fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
+    let session = Session::start(&[]).unwrap();
+    let mut triangles = 0;
+    let mut seen = |mesh: &Adapted| triangles = mesh.mesh.triangles.len();
+    let found = estimate::adapted(&session, scene, mesh, SOLVERS[0], accuracy, &mut seen);
+    let found = found.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(triangles, found.mesh.triangles.len(), "the last mesh shown is the answer");
+    found
+}
+
+/// The answer of the first solver.
+pub fn solved(scene: Scene, mesh: Mesh) -> Outcome {
+    let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
+    run(&problem, SOLVERS[0])
+}
+
 /// The scene `text` (TOML without `mesh`) on `mesh`.
 pub fn problem(mesh: Mesh, text: &str) -> Result<DiscreteProblem, SetupError> {
-    let text = format!("mesh.file = 'given.msh'\n{text}");
-    let scene = Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|e| panic!("{e}"));
-    DiscreteProblem::new(scene, mesh)
+    DiscreteProblem::new(scene(text), mesh)
 }
 
 /// A shipped scene with `--set` arguments.

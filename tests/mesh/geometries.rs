@@ -2,11 +2,9 @@
 
 use std::{
     collections::{BTreeMap, HashSet},
-    env,
     f64::consts::PI,
     fs,
     path::{Path, PathBuf},
-    process::Command,
     time::{Duration, SystemTime},
 };
 
@@ -298,23 +296,6 @@ fn a_constant_that_the_file_assigns_itself_is_no_parameter() {
         let told = read.is_err_and(|e| e.to_string().contains("assigns it, which overrules"));
         assert_eq!(told, overruled, "{text}");
     }
-}
-
-#[test]
-fn missing_gmsh_says_what_to_install() {
-    // The search path is this process's own: look again from a child without one.
-    if env::var_os("PATH").is_some_and(|path| path.is_empty()) {
-        let (_folder, geo) = copy("square");
-        let message = load(&geo, &BTreeMap::new(), Order::Linear).unwrap_err().to_string();
-        assert!(message.contains("make deps") && message.contains("apt install gmsh"));
-        return;
-    }
-    let child = Command::new(env::current_exe().unwrap())
-        .args(["--exact", "geometries::missing_gmsh_says_what_to_install"])
-        .env("PATH", "")
-        .output()
-        .unwrap();
-    assert!(child.status.success(), "{}", String::from_utf8_lossy(&child.stdout));
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn second_order_keeps_the_midpoints_of_curved_edges_only() {
 
 /// Two triangles on a square, one of them clockwise; stray tags and an unused node. The second triangle is in
 /// the surface `second`.
-fn square(second: usize, version: &str) -> String {
+fn square(second: usize) -> String {
     let names = ["1 5 \"ground floor\"", "1 6 \"ground floor\"", "2 1 \"body\""];
     let nodes = ["40 0 0 0", "7 1 0 1e-17", "1000000 1 1 0", "3 0 1 0", "99 5 5 5"];
     let last = format!("6 2 {second} 40 1000000 3");
@@ -155,56 +155,29 @@ fn square(second: usize, version: &str) -> String {
         &last,
         "9 1 8 40 1000000",
     ];
-    let comments = "$Comments\nanything $Nodes at all\n$EndComments\n";
-    let mesh = match version {
-        "4.1" => msh(&names, &nodes, &elements),
-        // MSH 2.2: tag, type, number of tags, group, entity, nodes. All are on one entity.
-        _ => {
-            let element = |line: &&str| {
-                let [tag, kind, rest] = line.splitn(3, ' ').collect::<Vec<_>>()[..] else {
-                    panic!()
-                };
-                let (group, nodes) = rest.split_once(' ').unwrap();
-                format!("{tag} {kind} 2 {group} 1 {nodes}")
-            };
-            let elements = elements.iter().map(element).collect::<Vec<_>>().join("\n");
-            format!(
-                "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n{}\n$EndPhysicalNames\n\
-                 $Nodes\n5\n{}\n$EndNodes\n$Elements\n7\n{elements}\n$EndElements\n",
-                names.join("\n"),
-                nodes.join("\n")
-            )
-        }
-    };
-    mesh.replace("$Elements", "$Periodic\n0\n$EndPeriodic\n$Elements").replacen(
-        "$Mesh",
-        &(comments.to_owned() + "$Mesh"),
-        1,
-    )
+    let mesh = msh(&names, &nodes, &elements);
+    let mesh = mesh.replace("$Elements", "$Periodic\n0\n$EndPeriodic\n$Elements");
+    format!("$Comments\nanything $Nodes at all\n$EndComments\n{mesh}")
 }
 
 #[test]
 fn tags_orientation_and_unused_nodes() {
-    for version in ["4.1", "2.2"] {
-        let mesh = read_bytes(square(1, version)).unwrap();
-        check_laws(&mesh, 1.0, 4.0, 0);
-        assert_eq!(mesh.nodes.len(), 4);
-        let names: Vec<_> = mesh.curves.keys().collect();
-        assert_eq!(names, ["8", "ground floor"]);
-        // Groups of one name are one curve, with each edge once.
-        assert_eq!(mesh.curves["ground floor"].edges.len(), 1);
-        close(curve_length(&mesh, "ground floor"), 1.0);
-        assert_eq!(mesh.curves["8"].edges.len(), 1);
-        assert_eq!(mesh.curves["8"].other_edges, 1);
-    }
-    let mesh = read_bytes(square(1, "4.1")).unwrap();
+    let mesh = read_bytes(square(1)).unwrap();
+    check_laws(&mesh, 1.0, 4.0, 0);
     assert_eq!(mesh.nodes, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
     assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    let names: Vec<_> = mesh.curves.keys().collect();
+    assert_eq!(names, ["8", "ground floor"]);
+    // Groups of one name are one curve, with each edge once.
+    assert_eq!(mesh.curves["ground floor"].edges.len(), 1);
+    close(curve_length(&mesh, "ground floor"), 1.0);
+    assert_eq!(mesh.curves["8"].edges.len(), 1);
+    assert_eq!(mesh.curves["8"].other_edges, 1);
 }
 
 #[test]
 fn line_ends_and_a_missing_last_one_do_not_matter() {
-    let text = square(1, "4.1");
+    let text = square(1);
     let mesh = read_bytes(&text).unwrap();
     assert!(mesh == read_bytes(text.replace('\n', "\r\n")).unwrap());
     assert!(mesh == read_bytes(text.trim_end()).unwrap());
@@ -222,17 +195,13 @@ fn the_order_of_sections_does_not_matter() {
 
 #[test]
 fn without_physical_surfaces_all_triangles_are_the_body() {
-    let named = read_bytes(square(1, "4.1")).unwrap();
+    let named = read_bytes(square(1)).unwrap();
     assert!(named.surfaces.values().eq([&vec![0, 1]]));
-    for version in ["4.1", "2.2"] {
-        let free =
-            square(0, version).replace("5 2 1 40", "5 2 0 40").replace("2 1 2 1\n5", "2 0 2 1\n5");
-        let free = free.replace("5 2 2 1 1 ", "5 2 2 0 1 ");
-        let free = read_bytes(free).unwrap();
-        assert!(free.surfaces.is_empty() && free.triangles.len() == 2);
-        // With them only theirs, and the diagonal becomes boundary.
-        let mesh = read_bytes(square(0, version)).unwrap();
-        check_laws(&mesh, 0.5, 2.0 + 2.0_f64.sqrt(), 0);
-        assert_eq!(mesh.curves["8"].edges.len(), 2);
-    }
+    let free = square(0).replace("5 2 1 40", "5 2 0 40").replace("2 1 2 1\n5", "2 0 2 1\n5");
+    let free = read_bytes(free).unwrap();
+    assert!(free.surfaces.is_empty() && free.triangles.len() == 2);
+    // With them only theirs, and the diagonal becomes boundary.
+    let mesh = read_bytes(square(0)).unwrap();
+    check_laws(&mesh, 0.5, 2.0 + 2.0_f64.sqrt(), 0);
+    assert_eq!(mesh.curves["8"].edges.len(), 2);
 }
