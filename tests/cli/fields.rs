@@ -1,45 +1,11 @@
 //! `fields.pvd` and its frames, read back.
 
+#[path = "../common/vtu.rs"]
+mod vtu;
+
 use crate::test_directory::TestDirectory;
-use std::path::Path;
-use vtkio::model::{Attribute, CellType, DataSet, Piece, Vtk};
-
-/// Names, values and components of point and cell data; the points; the types and nodes of the cells.
-struct Frame {
-    points: Vec<f64>,
-    types: Vec<CellType>,
-    nodes: Vec<Vec<usize>>,
-    point_data: Vec<(String, Vec<f64>)>,
-    cell_data: Vec<(String, Vec<f64>)>,
-}
-
-fn arrays(attributes: Vec<Attribute>) -> Vec<(String, Vec<f64>)> {
-    let array = |attribute| match attribute {
-        Attribute::DataArray(array) => {
-            (array.name, array.data.cast_into::<f64>().expect("real numbers"))
-        }
-        Attribute::Field { name, .. } => panic!("{name} is a field"),
-    };
-    attributes.into_iter().map(array).collect()
-}
-
-fn frame(path: &Path) -> Frame {
-    let vtk = Vtk::import(path).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
-    let DataSet::UnstructuredGrid { mut pieces, .. } = vtk.data else { panic!("another data set") };
-    let Some(Piece::Inline(piece)) = pieces.pop() else { panic!("no piece") };
-    let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
-    let firsts = std::iter::once(0).chain(offsets.iter().copied());
-    let cell = |(first, end): (u64, &u64)| {
-        connectivity[first as usize..*end as usize].iter().map(|&node| node as usize).collect()
-    };
-    Frame {
-        nodes: firsts.zip(&offsets).map(cell).collect(),
-        types: piece.cells.types,
-        points: piece.points.cast_into().expect("real numbers"),
-        point_data: arrays(piece.data.point),
-        cell_data: arrays(piece.data.cell),
-    }
-}
+use vtkio::model::CellType;
+use vtu::frame;
 
 fn field<'a>(data: &'a [(String, Vec<f64>)], name: &str) -> &'a [f64] {
     &data.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("no {name}")).1

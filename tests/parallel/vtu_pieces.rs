@@ -1,11 +1,14 @@
 //! Frames in pieces: together they are the frame that one rank writes.
 
+#[path = "../common/vtu.rs"]
+#[allow(dead_code, reason = "tests of other files read more of a frame")]
+mod vtu;
+
 use crate::{
     run_on_ranks,
     test_directory::{TestDirectory, sets, square},
 };
 use std::{collections::BTreeMap, path::Path};
-use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 
 /// Values at a point by the name of their array.
 type Values = BTreeMap<String, Vec<f64>>;
@@ -24,36 +27,25 @@ fn place(x: &[f64]) -> [i64; 2] {
 
 /// Adds a file's points and cells; those that are there already must have the same values.
 fn add(path: &Path, frame: &mut Frame) {
-    let vtk = Vtk::import(path).unwrap_or_else(|e| panic!("{}: {e:?}", path.display()));
-    let DataSet::UnstructuredGrid { mut pieces, .. } = vtk.data else { panic!("another data set") };
-    let Some(Piece::Inline(piece)) = pieces.pop() else { panic!("no piece") };
-    let points: Vec<f64> = piece.points.cast_into().expect("real numbers");
-    let at = |i: usize| &points[3 * i..3 * i + 2];
-    let values = |attributes: &[Attribute], count: usize| -> Vec<Values> {
-        let mut all = vec![Values::new(); count];
-        for attribute in attributes {
-            let Attribute::DataArray(array) = attribute else { panic!("a field") };
-            if array.name == "global_node" {
-                continue;
-            }
-            let data: Vec<f64> = array.data.clone().cast_into().expect("real numbers");
-            let width = data.len() / count;
-            for (values, data) in all.iter_mut().zip(data.chunks(width)) {
-                values.insert(array.name.clone(), data.to_vec());
-            }
-        }
-        all
+    let file = vtu::frame(path);
+    let at = |i: usize| &file.points[3 * i..3 * i + 2];
+    // The values of the i-th of `count` points or cells.
+    let values = |data: &[(String, Vec<f64>)], count: usize, i: usize| -> Values {
+        let own = data.iter().filter(|(name, _)| name != "global_node").map(|(name, all)| {
+            let width = all.len() / count;
+            (name.clone(), all[width * i..width * (i + 1)].to_vec())
+        });
+        own.collect()
     };
-    for (i, new) in values(&piece.data.point, points.len() / 3).into_iter().enumerate() {
+    let count = file.points.len() / 3;
+    for i in 0..count {
+        let new = values(&file.point_data, count, i);
         let old = frame.points.entry(place(at(i))).or_insert_with(|| new.clone());
         close(&new, old);
     }
-    let (_, corners) = piece.cells.cell_verts.into_legacy();
-    let corners: Vec<usize> = corners.into_iter().map(|i| i as usize).collect();
-    // Each cell is its number of nodes and these, the vertices first.
-    let triangles: Vec<&[usize]> = corners.chunks(1 + corners[0]).map(|t| &t[1..]).collect();
-    for (t, new) in triangles.iter().zip(values(&piece.data.cell, triangles.len())) {
-        let middle = [0, 1].map(|k| t[..3].iter().map(|&i| at(i)[k]).sum::<f64>() / 3.0);
+    for (t, nodes) in file.nodes.iter().enumerate() {
+        let middle = [0, 1].map(|k| nodes[..3].iter().map(|&i| at(i)[k]).sum::<f64>() / 3.0);
+        let new = values(&file.cell_data, file.nodes.len(), t);
         assert!(frame.cells.insert(place(&middle), new).is_none(), "a triangle in two pieces");
     }
 }
