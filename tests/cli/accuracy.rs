@@ -84,8 +84,8 @@ fn a_signal_while_meshes_are_tried_says_so() {
         (directory, run.expect("the program starts"))
     });
     sleep(Duration::from_secs(3));
+    runs.iter().for_each(|(_, run)| signal(run.id(), "INT"));
     for (directory, run) in runs {
-        signal(run.id(), "INT");
         let said = run.wait_with_output().expect("it ends");
         assert_eq!(said.status.code(), Some(130));
         let error = String::from_utf8_lossy(&said.stderr);
