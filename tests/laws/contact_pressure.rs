@@ -117,16 +117,24 @@ fn a_foundation_has_its_length_its_ends_and_its_line_of_action() {
         };
         assert!((value - expected).abs() < 1e-9, "{name} is {value}");
     }
-    // On a curved foundation too, the force at this point has the moment of the reactions.
-    let round = shipped("hertz", &[]);
-    let last = run(&round, SOLVERS[0]).last;
-    let names = [round.quantities(), round.contact_columns()].concat();
-    let values = [last.quantities, round.contact_figures(&last.state)].concat();
-    let value = |name: &str| {
-        values[names.iter().position(|other| *other == format!("foundation.{name}")).unwrap()]
-    };
-    let moment = value("acts_at_x") * value("force_y") - value("acts_at_y") * value("force_x");
-    close_to(moment, value("moment"), 1e-9);
-    assert!((value("contact_length") - value("contact_end_x")).abs() < 2e-4);
-    assert!(value("contact_start_x").abs() < 1e-12 && value("peak_x") < 1e-3);
+    // On a curved foundation and an inclined one, too, the force at this point has the moment of the reactions.
+    let text = "material = { young = 200, poisson = 0.3, plane = 'stress' }
+                boundary = [{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+                            { name = 'top', pressure = '2 + x' }]";
+    let inclined = problem(moved(square(4), |x| turn(0.4, x)), text);
+    let inclined = inclined.unwrap_or_else(|e| panic!("{e}"));
+    for (problem, foundation) in [(shipped("hertz", &[]), "foundation"), (inclined, "bottom")] {
+        let last = run(&problem, SOLVERS[0]).last;
+        let names = [problem.quantities(), problem.contact_columns()].concat();
+        let values = [last.quantities, problem.contact_figures(&last.state)].concat();
+        let value = |name: &str| {
+            values[names.iter().position(|other| *other == format!("{foundation}.{name}")).unwrap()]
+        };
+        let moment = value("acts_at_x") * value("force_y") - value("acts_at_y") * value("force_x");
+        close_to(moment, value("moment"), 1e-9);
+        if foundation == "foundation" {
+            assert!((value("contact_length") - value("contact_end_x")).abs() < 2e-4);
+            assert!(value("contact_start_x").abs() < 1e-12 && value("peak_x") < 1e-3);
+        }
+    }
 }
