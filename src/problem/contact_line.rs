@@ -9,12 +9,16 @@
 //!
 //! with the quotients p of the reactions of a and b alone by ∫φ. A pressure that is linear in the arc length keeps its
 //! values. The reaction of a vertex with a prescribed displacement is not of contact: the edge is shared in halves.
+//!
+//! Where boundaries meet smoothly at a node, those with the least gap there share its reaction.
 
 use super::State;
 use crate::{
+    ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge},
     mesh::Face,
+    scene::{Expression, Gap},
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,6 +30,17 @@ pub struct ContactLine {
     pub(super) stations: Vec<Station>,
     /// Per node: its station and its face on each of its edges.
     places: BTreeMap<usize, Vec<(usize, Face)>>,
+    /// Per number of a boundary: its gap g(x, y, t), m.
+    gaps: BTreeMap<usize, Expression>,
+}
+
+/// The share of a station in a contact point: its factors of the force F and of the pressure F/∫φ, and its gap beyond
+/// the least one there, m.
+pub(super) struct Share {
+    pub(super) station: usize,
+    pub(super) force: f64,
+    pressure: f64,
+    farther: f64,
 }
 
 /// A vertex or the middle of an edge, on one part of a boundary. A corner is two stations, and so is the vertex at
@@ -74,14 +89,15 @@ pub struct ContactRow {
 type Reaction = [f64; 7];
 
 impl ContactLine {
-    /// Adds the boundary `name` with the number `boundary`, whose obstacle has this `normal` if it is given.
+    /// Adds the boundary `name` with the number `boundary`.
     pub(super) fn add(
         &mut self,
         (boundary, name): (usize, &str),
-        normal: Option<[f64; 2]>,
+        Gap { distance: gap, normal }: &Gap,
         points: &[[f64; 2]],
         edges: &[Edge],
     ) {
+        self.gaps.insert(boundary, gap.clone());
         let distance =
             |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
         let face = |face: Face| Face { normal: normal.unwrap_or(face.normal), ..face };
@@ -126,24 +142,35 @@ impl ContactLine {
     /// The line with the places of a rank's nodes, to which `own` gives new numbers.
     pub(super) fn restrict(&self, own: impl Fn(&usize) -> Option<usize>) -> Self {
         let places = self.places.iter().filter_map(|(n, of)| Some((own(n)?, of.clone())));
-        Self { stations: self.stations.clone(), places: places.collect() }
+        Self { places: places.collect(), ..self.clone() }
     }
 
-    /// The stations of a contact point, each with its share of the force: all faces that the normal of the point
-    /// continues, by their lengths.
-    pub(super) fn shares(&self, point: &ContactPoint) -> Vec<(usize, f64)> {
+    /// The shares of a contact point at time t: at all faces that its normal continues. Those of the boundaries with the
+    /// least gap there bear the force, by their lengths.
+    pub(super) fn shares(&self, point: &ContactPoint, t: f64) -> Vec<Share> {
         let Some(all) = self.places.get(&point.node) else { return Vec::new() };
         let own = Face { normal: point.normal, length: 0.0 };
         let mut near: Vec<_> = all.iter().filter(|(_, face)| face.continues(&own)).collect();
         if near.is_empty() {
             near.extend(all.iter().min_by(|a, b| a.1.angle(&own).total_cmp(&b.1.angle(&own))));
         }
-        let total: f64 = near.iter().map(|(_, face)| face.length).sum();
-        let mut shares = BTreeMap::new();
-        for (station, face) in near {
-            *shares.entry(*station).or_insert(0.0) += face.length / total;
-        }
-        shares.into_iter().collect()
+        let mut lengths = BTreeMap::new();
+        near.into_iter().for_each(|(s, face)| *lengths.entry(*s).or_insert(0.0) += face.length);
+        let gap = |station: usize| {
+            let Station { boundary, row: ContactRow { x, y, .. }, .. } = &self.stations[station];
+            self.gaps.get(boundary).map_or(0.0, |gap| gap.eval(*x, *y, t))
+        };
+        let least = lengths.keys().map(|station| gap(*station)).fold(f64::INFINITY, f64::min);
+        let total: f64 = lengths.values().sum();
+        let bears = |station: usize| gap(station) - least <= ROUNDING * total;
+        let bearing = lengths.iter().filter(|(station, _)| bears(**station));
+        let bearing: f64 = bearing.map(|(_, length)| length).sum();
+        let share = |(&station, length): (&usize, &f64)| {
+            let part = if bears(station) { 1.0 / bearing } else { 0.0 };
+            let [force, pressure] = [length * part, total * part];
+            Share { station, force, pressure, farther: gap(station) - least }
+        };
+        lengths.iter().map(share).collect()
     }
 
     /// The rows in a state, boundary by boundary and along each, on every rank; and the pressures at this rank's nodes of
@@ -154,11 +181,12 @@ impl ContactLine {
             // No -0.
             let [nx, ny] = normal.map(|n| n + 0.0);
             let force = if active { force } else { 0.0 };
-            let active = f64::from(u8::from(active));
-            let of = move |(station, share)| {
-                [station as f64, nx, ny, gap, share * force, pressure, active]
+            let of = move |share: Share| {
+                let (station, gap) = (share.station as f64, gap + share.farther);
+                let active = f64::from(u8::from(active && share.force > 0.0));
+                [station, nx, ny, gap, share.force * force, share.pressure * pressure, active]
             };
-            self.shares(point).into_iter().map(of)
+            self.shares(point, state.time).into_iter().map(of)
         };
         let own: Vec<Reaction> = state.contact.iter().flat_map(reactions).collect();
         let all = body.nodes.partition.comm().gather(own.as_flattened());

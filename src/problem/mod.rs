@@ -203,7 +203,8 @@ impl DiscreteProblem {
 
     /// The values of [`Self::quantities`] in a state with the residual forces `unbalanced` = f − Ku. Collective.
     pub(crate) fn quantities_in(&self, state: &State, unbalanced: &[f64]) -> Vec<f64> {
-        let mut values = self.supports.resultants(&self.body, unbalanced, &state.contact);
+        let mut values =
+            self.supports.resultants(&self.body, unbalanced, (&state.contact, state.time));
         values.extend(self.probes.values(self, state));
         self.body.nodes.partition.comm().sum(&mut values);
         self.without_rounding(values)

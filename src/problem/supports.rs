@@ -34,7 +34,7 @@ impl Supports {
             let curve = body.mesh.curves.get(name);
             if let (Some(gap), Some(number), Some(curve)) = (boundary.gap(), number, curve) {
                 let edges = body.edges(&curve.edges);
-                supports.contact.add((number, name), gap.normal, &body.nodes.points, &edges);
+                supports.contact.add((number, name), gap, &body.nodes.points, &edges);
             }
         }
         supports
@@ -59,7 +59,7 @@ impl Supports {
         &self,
         body: &Body,
         unbalanced: &[f64],
-        contact: &[ContactPoint],
+        (contact, t): (&[ContactPoint], f64),
     ) -> Vec<f64> {
         let mut sums = vec![0.0; 3 * self.names.len()];
         let mut add = |boundary: usize, node: usize, [fx, fy]: [f64; 2]| {
@@ -73,9 +73,9 @@ impl Supports {
             .collect();
         for point in contact {
             let force = point.normal.map(|n| -point.force * n);
-            for (station, share) in self.contact.shares(point) {
-                let boundary = self.contact.stations[station].boundary;
-                add(boundary, point.node, force.map(|f| share * f));
+            for share in self.contact.shares(point, t) {
+                let boundary = self.contact.stations[share.station].boundary;
+                add(boundary, point.node, force.map(|f| share.force * f));
             }
             if let Some([x, y]) = rest.get_mut(&point.node) {
                 (*x, *y) = (*x - force[0], *y - force[1]);

@@ -95,6 +95,29 @@ fn the_area_under_the_pressure_is_the_force_of_each_foundation() {
 }
 
 #[test]
+fn a_foundation_that_is_farther_away_bears_nothing_at_a_shared_node() {
+    for degree in [1, 2] {
+        let text = format!(
+            "discretisation.displacement = {degree}
+             material = {{ young = 200, poisson = 0.3, plane = 'strain' }}
+             boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'near', gap = 0 }},
+                         {{ name = 'far', gap = 0.1 }}, {{ name = 'right', symmetry = true }},
+                         {{ name = 'top', traction = [0, -1] }}]"
+        );
+        let problem = problem(divided(square(8), 0.5), &text).unwrap_or_else(|e| panic!("{e}"));
+        let last = run(&problem, SOLVERS[0]).last;
+        for part in parts(&problem, &last.state) {
+            match &*part[0].boundary {
+                "near" => close_to(area(&part), last.record.contact_force, 1e-9),
+                _ => assert!(part.iter().all(|row| row.active == 0 && row.gap > 0.05)),
+            }
+        }
+        let force = problem.quantities().iter().position(|name| name == "far.force_y").unwrap();
+        assert_eq!(last.quantities[force], 0.0, "P{degree}");
+    }
+}
+
+#[test]
 fn a_foundation_has_its_length_its_ends_and_its_line_of_action() {
     // Uniform pressure 3 on two halves: each one carries it in its middle.
     let text = "contact.tolerance = 1e-12
