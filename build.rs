@@ -23,7 +23,7 @@ const PETSC: &str = "\
     MatSeqAIJRestoreArray|MatSeqAIJGetArrayRead|MatSeqAIJRestoreArrayRead|\
     MatCreateShell|MatShellSetOperation|MatShellGetContext|MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
     KSPCreate|KSPDestroy|KSPSetType|KSPSetOptionsPrefix|KSPSetFromOptions|KSPSetOperators|KSPSolve|\
-    KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReason|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|KSPGetTolerances|\
+    KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReasonString|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|KSPGetTolerances|\
     PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
     PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|\
     PCSetApplicationContext|PCGetApplicationContext|PCShellSetApply|PCShellSetSetUp|PCShellSetName|\

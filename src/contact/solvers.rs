@@ -130,9 +130,15 @@ impl ContactReport {
     fn add_solve(&mut self, method: &str, solve: SolveReport) -> Result<(), ContactError> {
         self.linear_iterations += solve.iterations;
         self.factorisations += solve.factorisations;
-        let detail = "the stiffness of its linear system is not positive definite, or too \
-                      ill-conditioned for the tolerance, or a KSP of PETSc options has not converged";
-        let stopped = || ContactError::stopped(method, *self, Kkt::UNKNOWN, detail);
+        let detail = solve.gave_up.map_or_else(
+            || {
+                "the stiffness of its linear system is not positive definite, or too ill-conditioned for the \
+                 tolerance"
+                    .to_owned()
+            },
+            |reason| format!("PETSc's KSP ended with {reason} above its tolerance"),
+        );
+        let stopped = || ContactError::stopped(method, *self, Kkt::UNKNOWN, &detail);
         solve.converged.then_some(()).ok_or_else(stopped)
     }
 

@@ -45,6 +45,8 @@ pub struct SolveReport {
     pub iterations: usize,
     /// Factorisations, also of a matrix that is not positive definite.
     pub factorisations: usize,
+    /// PETSc's reason if a KSP with a preconditioner of PETSc options missed its limit.
+    pub gave_up: Option<&'static str>,
 }
 
 /// The largest number of iterations with the factor of the system itself. One or two remove the rounding
@@ -276,6 +278,7 @@ impl LinearSolver {
         x.axpby(1.0, &self.correction, 1.0)?;
         report.iterations += solved.iterations;
         report.converged = self.is_small(limit);
+        report.gave_up = solved.reason.filter(|_| !report.converged);
         self.end_solve(report.iterations, self.norm, limit);
         Ok(())
     }
@@ -286,11 +289,6 @@ impl LinearSolver {
         let reached = (self.first_norm / norm).ln();
         let reduction = Reduction { asked: self.asked(limit), reached };
         self.factor.end_solve(Some(iterations), reduction);
-    }
-
-    /// Has a solve used all iterations that the preconditioner is worth?
-    pub fn is_slow(&self, iterations: usize, limit: f64) -> bool {
-        self.factor.iteration_limit(self.asked(limit)).is_none_or(|most| iterations >= most)
     }
 
     /// b − A x of the last solve. On prescribed unknowns these are the forces that prescribe them.

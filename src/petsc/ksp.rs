@@ -49,6 +49,8 @@ pub(crate) struct KspReport {
     pub(crate) iterations: usize,
     /// ‖b − A x‖₂ of the free unknowns.
     pub(crate) norm: f64,
+    /// PETSc's reason for the end, as `DIVERGED_ITS`; `None` with the preconditioner [`kept::NAME`].
+    pub(crate) reason: Option<&'static str>,
 }
 
 /// The context of the convergence test during a solve.
@@ -185,13 +187,14 @@ impl Ksp {
         let (ksp, pc) = (self.handle.raw(), self.pc()?);
         // Some of PETSc's preconditioners read the entries in every application.
         let matrix = problem.matrix;
-        let stored = if self.is_kept()? { matrix.stored() } else { matrix.assembled()? };
+        let is_kept = self.is_kept()?;
+        let stored = if is_kept { matrix.stored() } else { matrix.assembled()? };
         let mut context = Context { preconditioner: kept };
         let Self { residual, work, .. } = self;
         let mut test = Test { problem, residual, work, norm: None };
         let pointer = ptr::from_mut(&mut test).cast::<c_void>();
         let most = problem.most.and_then(|most| most.try_into().ok()).unwrap_or(self.most);
-        let mut iterations = 0;
+        let (mut iterations, mut reason) = (0, ptr::null());
         // SAFETY: live handles of matching layout; the callbacks run only during the solve, and their
         // contexts outlive it.
         unsafe {
@@ -201,7 +204,11 @@ impl Ksp {
             check(raw::KSPSetConvergenceTest(ksp, Some(is_converged), pointer, None))?;
             check(raw::KSPSolve(ksp, b.raw(), x.raw()))?;
             check(raw::KSPGetIterationNumber(ksp, &mut iterations))?;
+            check(raw::KSPGetConvergedReasonString(ksp, &mut reason))?;
         }
+        // SAFETY: a name in PETSc's constant table.
+        let reason = unsafe { CStr::from_ptr(reason) }.to_str().ok();
+        let reason = reason.filter(|_| !is_kept);
         let tested = test.norm;
         let norm = match tested {
             Some(norm) => norm,
@@ -212,7 +219,7 @@ impl Ksp {
                 self.residual.free_norm(problem.prescribed)?
             }
         };
-        Ok(KspReport { iterations: iterations as usize, norm })
+        Ok(KspReport { iterations: iterations as usize, norm, reason })
     }
 
     /// b − A x of the last solve, on all unknowns.

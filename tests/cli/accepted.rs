@@ -142,6 +142,8 @@ fn solvers_and_petsc_options_agree() {
     ] {
         let said = test_directory.run(&[&PARTLY_OPEN[..], arguments].concat());
         assert_eq!(said.err, "", "{arguments:?}");
+        let gives_up = arguments.ends_with(&["preonly", "-elastic_pc_type", "jacobi"]);
+        assert_eq!(said.out.contains("PETSc's KSP ended with CONVERGED_ITS"), gives_up);
         let summary = test_directory.summary("out/scene");
         let active = number(&summary["active_nodes"]);
         assert!(0.0 < active && active < number(&summary["contact_nodes"]), "{active}");

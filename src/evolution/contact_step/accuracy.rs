@@ -26,6 +26,8 @@ pub struct Accuracy {
     ///
     /// The larger error of two steps: the last one, and the one with the maximum stationarity residual.
     pub displacement: f64,
+    /// PETSc's reason if a KSP of PETSc options could not estimate this error, which is infinite then.
+    pub gave_up: Option<&'static str>,
     /// The time of this step, s.
     pub time: f64,
     /// The discretisation error in the energy norm in the last step. If it is unloaded: in the
@@ -42,12 +44,16 @@ impl Accuracy {
     /// Notes for the user on these errors at a KKT tolerance; none if they are small.
     pub fn notes(&self, tolerance: f64) -> Vec<String> {
         let (displacement, time) = (self.displacement, self.time);
-        let support = match displacement {
-            f64::INFINITY => Some(format!(
+        let support = match (displacement, self.gave_up) {
+            (f64::INFINITY, Some(reason)) => Some(format!(
+                "at t = {time:.4e}, PETSc's KSP ended with {reason} above its tolerance: the error of the \
+                 displacements cannot be estimated; change the options -elastic_ksp_… and -elastic_pc_…"
+            )),
+            (f64::INFINITY, None) => Some(format!(
                 "at t = {time:.4e}, the active contact nodes alone do not support the body: the error of \
                  the displacements cannot be estimated"
             )),
-            _ => (displacement > Self::promised(tolerance)).then(|| {
+            (_, _) => (displacement > Self::promised(tolerance)).then(|| {
                 format!(
                     "the stiffness is ill-conditioned (a slender or very soft part?): displacements \
                      at t = {time:.4e} are exact only to about {displacement:.0e} of the largest, \
@@ -74,6 +80,7 @@ pub(crate) struct FixedContact<'a> {
     /// The fixed unknowns.
     active: Vec<usize>,
     solver: LinearSolver,
+    gave_up: Option<&'static str>,
     rhs: Vector,
     answer: Vector,
 }
@@ -84,7 +91,8 @@ impl<'a> ContactStep<'a> {
         let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
         let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
         solver.factor().set_condensed(&stiffness.matrix, bounded)?;
-        Ok(FixedContact { problem, stiffness, active: Vec::new(), solver, rhs: load, answer: c })
+        let (active, gave_up, rhs, answer) = (Vec::new(), None, load, c);
+        Ok(FixedContact { problem, stiffness, active, solver, gave_up, rhs, answer })
     }
 }
 
@@ -97,7 +105,8 @@ impl FixedContact<'_> {
         let last = &outcome.last;
         let max = outcome.most_displaced().record.displacement_max;
         let displacement = self.displacement_error(&last.state, max)?;
-        let mut accuracy = Accuracy { displacement, energy: 0.0, time: last.state.time };
+        let (gave_up, time) = (self.gave_up, last.state.time);
+        let mut accuracy = Accuracy { displacement, gave_up, energy: 0.0, time };
         let Some(worst) = &outcome.least_accurate else { return Ok(accuracy) };
         let ratio = worst.record.kkt_stationarity / last.record.kkt_stationarity;
         let expected = displacement * ratio.max(1.0);
@@ -106,7 +115,8 @@ impl FixedContact<'_> {
         }
         let displacement = self.displacement_error(&worst.state, max)?;
         if displacement > accuracy.displacement {
-            accuracy = Accuracy { displacement, time: worst.state.time, ..accuracy };
+            let (gave_up, time) = (self.gave_up, worst.state.time);
+            accuracy = Accuracy { displacement, gave_up, time, ..accuracy };
         }
         Ok(accuracy)
     }
@@ -140,7 +150,7 @@ impl FixedContact<'_> {
     /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or
     /// more. `None` if these nodes do not support the body. Collective.
     fn displacement(&mut self, mut forces: Vec<f64>) -> Result<Option<Vec<f64>>, PetscError> {
-        let Self { problem, stiffness, active, solver, rhs, answer } = self;
+        let Self { problem, stiffness, active, solver, gave_up, rhs, answer } = self;
         let bases = &problem.constraints.bases;
         bases.force_to_local(&mut forces);
         bases.zero_fixed(&mut forces);
@@ -150,8 +160,9 @@ impl FixedContact<'_> {
         let norm = rhs.norm()?;
         // With an old factor, the error may have one digit less than the residual.
         let system = system(problem, stiffness, active);
-        let solved = solver.solve_renewing(system, rhs, answer, 0.01 * norm)?.converged;
-        solved.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
+        let solved = solver.solve_renewing(system, rhs, answer, 0.01 * norm)?;
+        *gave_up = solved.gave_up;
+        solved.converged.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
     }
 }
 

@@ -142,6 +142,11 @@ impl LinearSolver {
         Ok(())
     }
 
+    /// Has a solve used all iterations that the preconditioner is worth?
+    pub fn is_slow(&self, iterations: usize, limit: f64) -> bool {
+        self.factor.iteration_limit(self.asked(limit)).is_none_or(|most| iterations >= most)
+    }
+
     /// Prescribes unknowns in a condensed factor. It returns false if there is no preconditioner afterwards.
     /// Collective.
     pub(crate) fn prescribe(&mut self, unknowns: &[usize]) -> Result<bool, PetscError> {
