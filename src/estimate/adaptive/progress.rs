@@ -67,15 +67,18 @@ impl<'a> Progress<'a> {
     }
 
     /// Whether the error of `name` is too large and has not become half of what it was with an eighth of the triangles,
-    /// or two measurements before, each of which reduced the triangles that cause it. Of first order it would be a
-    /// third.
+    /// or two measurements before. Only measurements count in which it was too large: after each of them the triangles
+    /// that cause it became smaller. Of first order it would be a third.
     fn stays(&self, name: &str) -> bool {
         let [earlier @ .., (triangles, last)] = &self.excesses[..] else { return false };
-        let Some(last) = last.get(name).filter(|excess| **excess > 1.0) else { return false };
+        let missed = |of: &BTreeMap<String, f64>| of.get(name).copied().filter(|of| *of > 1.0);
+        let Some(last) = missed(last) else { return false };
+        let earlier = earlier.iter().filter_map(|(count, of)| Some((*count, missed(of)?)));
+        let earlier: Vec<(usize, f64)> = earlier.collect();
         let much_coarser = earlier.iter().filter(|(count, _)| 8 * count <= *triangles);
         let some_before = earlier.len().checked_sub(BETWEEN).map(|i| &earlier[i]);
-        let before = much_coarser.chain(some_before).filter_map(|(_, excess)| excess.get(name));
-        before.copied().reduce(f64::max).is_some_and(|largest| *last > 0.5 * largest)
+        let before = much_coarser.chain(some_before).map(|(_, excess)| *excess);
+        before.reduce(f64::max).is_some_and(|largest| last > 0.5 * largest)
     }
 
     /// Whether the estimated error has not become half of what it was with a sixty-fourth of the triangles.
