@@ -145,6 +145,8 @@ class Frame:
 
     def line(self, start, end, name, count=401):
         """A field along a straight line: the distances from its start and the values, NaN outside the body."""
+        if not np.subtract(end, start).any():
+            raise ValueError("both ends of the line are the same point; give two points")
         s = np.linspace(0.0, 1.0, count)[:, None]
         points = (1 - s) * np.asarray(start, float) + s * np.asarray(end, float)
         return s[:, 0] * np.linalg.norm(np.subtract(end, start)), self.at(points, name)

@@ -58,14 +58,25 @@ def values_of(text):
 
 def cases_of(path):
     """The keys and, for each row of a CSV file, the keys with their values; empty cells are left out."""
+    def refuse(problem):
+        raise argparse.ArgumentTypeError(f"{path}: {problem}")
+
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
-            head, *rows = ([cell.strip() for cell in row] for row in csv.reader(file) if any(row))
-        return head, [[(key, value) for key, value in zip(head, row, strict=True) if value] for row in rows]
+            reader = csv.reader(file)
+            lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or (
-            "needs a head with keys, and as many cells in each row; put values with commas in quotes")
-        raise argparse.ArgumentTypeError(f"{path}: {reason}") from None
+        refuse(getattr(error, "strerror", None) or error)
+    if len(lines) < 2:
+        refuse("needs a head with keys, and a row for each run")
+    (first, head), *rows = lines
+    if any(";" in key for key in head):
+        refuse(f"line {first} has semicolons; separate the cells by commas")
+    for line, row in rows:
+        if len(row) != len(head):
+            refuse(f"line {line} has {len(row)} cells and the head {len(head)}; leave cells empty between commas, and put "
+                   "values with commas in quotes")
+    return head, [[(key, value) for key, value in zip(head, row) if value] for _, row in rows]
 
 
 def name_of(chosen):

@@ -113,9 +113,8 @@ def table(scene):
     for k, entry in enumerate(scene.material.split("; ")):
         *name, e, nu = entry.split() if k else entry.split()[:2]
         young[name[0] if name else ""] = {"young": float(e), "poisson": float(nu)}
-    material = {**young.pop(""), "plane": scene.material.split(";")[0].split()[2]}
+    material = {**young.pop(""), "plane": scene.material.split(";")[0].split()[2], **young}
     result = {"title": scene.name, "mesh": {"file": f"{scene.name}.geo"}, "material": material}
-    result |= {f"material.{name}": values for name, values in young.items()}
     if scene.damage:
         diffusion, lambda_d, lambda_u, lambda_w, initial = (scene.damage.split() + ["0", "1"][len(scene.damage.split()) - 3:])
         result["damage"] = {"diffusion": float(diffusion), "lambda_d": float(lambda_d), "lambda_u": float(lambda_u),
