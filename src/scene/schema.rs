@@ -240,13 +240,14 @@ fn check_value(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<()
         Some(name) => value.as_str() == Some(name),
         None => number.is_some() && number == choice.as_f64(),
     };
+    let is_text = value.as_str().is_some_and(|text| !text.trim().is_empty());
     let rule = schema["values"].as_str().unwrap_or("finite");
     let (wanted, holds) = match (schema["enum"].as_array(), schema["type"].as_str(), number) {
         (Some(choices), ..) => {
             let names: Vec<String> = choices.iter().map(Schema::to_string).collect();
             (names.join(" or "), choices.iter().any(is))
         }
-        (_, Some("string"), _) => ("a string".to_owned(), value.is_str()),
+        (_, Some("string"), _) => ("a string that is not empty".to_owned(), is_text),
         (_, Some("boolean"), _) => ("true or false".to_owned(), value.is_bool()),
         (_, Some("array"), _) if schema["maxItems"] == 2 && schema["items"]["type"] != "number" => {
             ("an array of two, expressions in quotes, like [\"2*x\", 0]".to_owned(), false)

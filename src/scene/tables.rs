@@ -56,6 +56,11 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     for (name, law) in laws {
         surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
     }
+    if surfaces.contains_key("material") {
+        let problem =
+            "has the name of the rest of the body in the results; give the surface another name";
+        found.note("material.material", problem);
+    }
     let degree = degree.unwrap_or(if accuracy.is_some() { 2.0 } else { 1.0 });
     Some(Scene {
         path: path.to_owned(),
@@ -232,8 +237,5 @@ fn probe(probe: Probe, boundaries: &[Boundary]) -> Result<Probe, Diagnostic> {
     if boundaries.iter().any(|other| other.name == probe.name) {
         return Err(("", "has the name of a boundary; choose another one".to_owned()));
     }
-    match probe.name.trim().is_empty() {
-        true => Err(("name", "is empty; its columns begin with it".to_owned())),
-        false => Ok(probe),
-    }
+    Ok(probe)
 }

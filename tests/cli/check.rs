@@ -34,8 +34,8 @@ fn a_scene_that_cannot_be_solved_is_refused_after_its_mesh_is_described() {
         test_directory.say(&["check", "scene.toml", "--set", "boundary.top.traction=[0, 1]"]);
     said.fails(2, &["the vertical translation", "the load drives it"]);
     assert!(said.out.contains("32 triangles"), "{said:?}");
-    let said = test_directory.say(&["check", "scene.toml", "--set", "boundary.top.name=''"]);
-    said.fails(2, &["boundary \"\" is no physical curve"]);
+    let said = test_directory.say(&["check", "scene.toml", "--set", "boundary.top.name=lid"]);
+    said.fails(2, &["boundary \"lid\" is no physical curve"]);
     assert_eq!(said.out, "");
 }
 

@@ -157,5 +157,5 @@ fn names_may_look_like_keys_and_are_not_empty() {
     let probe = ["probe=[{name='', point=[0, 0]}]".to_owned()];
     let refused = Scene::parse(BASE, Path::new("p.toml"), &probe);
     let message = refused.expect_err("no name").to_string();
-    assert!(message.contains("probe[0].name is empty"), "{message}");
+    assert!(message.contains("probe[0].name must be a string that is not empty"), "{message}");
 }
