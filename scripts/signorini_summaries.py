@@ -1,7 +1,6 @@
 """Reads summary.json of runs: figures with their error bars and units, as rows of a table."""
 
 import json
-import re
 from pathlib import Path
 
 # The columns of a table, by default.
@@ -90,8 +89,7 @@ def rows_of(folders, summaries, columns, settings=None):
             row[f"{name}.singular"] = ((summary.get("extremes") or {}).get(name) or {}).get("singular")
             if summary and (unit := unit_of(name, units_of(summary))):
                 units.setdefault(name, {})[unit] = units.setdefault(f"{name}.bar", {})[unit] = None
-        asked = [re.match("accuracy .*?(NOT )?reached", note) for note in summary.get("notes", [])]
-        row["reached"] = next(("no" if found[1] else "yes" for found in asked if found), None)
+        row["reached"] = {True: "yes", False: "no"}.get(summary.get("reached"))
         error = summary.get("error")
         row["status"] = "failed" if error else "stopped" if summary.get("stopped_by") else "finished"
         rows.append({**row, "error": error})

@@ -151,17 +151,17 @@ pub(super) fn kink_note(task: &Task) -> Option<String> {
     let may_be_smooth = |kink: &Kink| kink.angle < CORNER_ANGLE;
     let kinks = kinks.filter(|(allowed, kink)| may_be_smooth(kink) && kink.angle > 2.0 * allowed);
     let (_, kink) = kinks.max_by(|(a, p), (b, q)| (p.angle / a).total_cmp(&(q.angle / b)))?;
-    let [x, y] = mesh.nodes[kink.node];
+    let at = mesh.place(mesh.nodes[kink.node]);
     Some(format!(
-        "curved edges meet at ({x:.4}, {y:.4}) at an angle of {:.1e}°: if the curve is smooth there, the bars do not \
+        "curved edges meet at {at} at an angle of {:.1e}°: if the curve is smooth there, the bars do not \
          contain the error of its shape; set smaller sizes there in the .geo",
         kink.angle.to_degrees()
     ))
 }
 
-/// The closing line on the required accuracy: reached, or the errors that are too large. `None` without a
-/// required accuracy.
-pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<String> {
+/// Is the required accuracy reached? With the closing line: the mesh, and the errors that are too large. `None` without
+/// a required accuracy.
+pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(bool, String)> {
     let (adapted, scene) = (task.adapted.as_ref()?, task.problem.scene());
     let accuracy = scene.accuracy?;
     let (triangles, rounds) = (adapted.mesh.triangles.len(), adapted.rounds);
@@ -173,7 +173,7 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<St
         [] => format!("accuracy {accuracy}"),
         names => format!("accuracy {accuracy} of {}", names.join(", ")),
     };
-    let Some(outcome) = outcome else { return Some(format!("{asked}: {mesh}")) };
+    let Some(outcome) = outcome else { return Some((false, format!("{asked}: {mesh}"))) };
     let bars = outcome.bars.iter().filter(|bar| is_asked(task, &bar.name));
     let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
     let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
@@ -198,8 +198,9 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<St
     let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {
         format!(" (stresses at probes: of {:.1e} {})", bar.scale, scene.units.stress)
     });
-    Some(match reasons.is_empty() {
+    let note = match reasons.is_empty() {
         true => format!("{asked} reached{of_time}{stresses}: {mesh}"),
         false => format!("{asked} NOT reached ({}): {mesh}", reasons.join("; ")),
-    })
+    };
+    Some((reasons.is_empty(), note))
 }

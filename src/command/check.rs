@@ -89,7 +89,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
             ("  boundary", format!("  {name}")),
             ("conditions", conditions),
             ("edges", edges.len().to_string()),
-            (&*measure, format!("{length:.4}")),
+            (&*measure, short(length)),
             ("outward normal", normal),
         ]
     };

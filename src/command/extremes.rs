@@ -16,8 +16,7 @@ pub(super) fn stresses(extremes: &Extremes, units: &Units, shown: &Shown) -> Vec
     let largest = extreme(von_mises, unit, shown);
     let grows = match von_mises.singular.as_deref() {
         Some(place) if place != GROWS => format!(" at {place}, grows as the mesh is refined"),
-        Some(_) => ", grows as the mesh is refined".to_owned(),
-        None => String::new(),
+        _ => String::new(),
     };
     let [most, least] = [most, least].map(|of| extreme(of, unit, shown));
     let of_material = |of: &[Extreme; 3]| {
@@ -47,21 +46,19 @@ pub(super) fn contact(extremes: &Extremes, units: &Units, shown: &Shown) -> Vec<
 }
 
 /// The place of which `name` is the x in `quantities` and the next entry the y; `None` without one.
-pub(super) fn place(quantities: &[(String, f64)], name: &str) -> Option<String> {
+pub(super) fn place(quantities: &[(String, f64)], name: &str, shown: &Shown) -> Option<String> {
     let i = quantities.iter().position(|(other, _)| other == name)?;
     let (x, y) = (quantities[i].1, quantities[i + 1].1);
-    x.is_finite().then(|| format!("({x:.4}, {y:.4})"))
+    x.is_finite().then(|| shown.mesh.place([x, y]))
 }
 
 /// An extreme with its place: with its bar, or with two digits if it is singular.
-fn extreme(
-    Extreme { name, value, at: [x, y], singular }: &Extreme,
-    unit: &str,
-    shown: &Shown,
-) -> String {
-    let (value, singular) = match singular {
+fn extreme(Extreme { name, value, at, singular }: &Extreme, unit: &str, shown: &Shown) -> String {
+    let (value, singular) = match singular.as_deref() {
+        // The place may be smooth: on finer meshes the extreme may lie elsewhere.
+        Some(GROWS) => (format!("{value:.1e}"), ": grows as the mesh is refined"),
         Some(_) => (format!("{value:.1e}"), ": singular"),
         None => (shown.figure(*value, name, 4), ""),
     };
-    format!("{value} {unit} at ({x:.4}, {y:.4}){singular}")
+    format!("{value} {unit} at {}{singular}", shown.mesh.place(*at))
 }

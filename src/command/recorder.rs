@@ -230,7 +230,7 @@ fn columns(problem: &DiscreteProblem) -> Vec<String> {
 /// The notes on a run, except remarks. Collective.
 fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
     let of_accuracy = [
-        accuracy::accuracy_note(task, outcome),
+        accuracy::accuracy_note(task, outcome).map(|(_, note)| note),
         accuracy::kink_note(task),
         outcome.and_then(|outcome| accuracy::missing_bars(task, outcome)),
     ];

@@ -167,6 +167,10 @@ fn read<'a>(
     agree(comm, output::check_is_writable(&folder).map_err(Failure::input))?;
     let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
     let restart = restart.transpose()?.flatten();
+    if arguments.restart && restart.is_none() && comm.is_root() {
+        let folder = folder.display();
+        tell("warning", &format!("{folder} has no checkpoint; the run begins at its start"));
+    }
     let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;

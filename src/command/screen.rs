@@ -4,6 +4,7 @@ use super::{extremes, task::Task};
 use signorini::{
     estimate::{Adapted, Extremes},
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
+    mesh::Mesh,
     output::terminal::{Progress, say, with_bar},
     problem::Collapse,
     scene::{Probe, Scheme, Stepping, TimeGrid, Units, rounded},
@@ -13,8 +14,8 @@ use std::{
     io::{self, Write},
 };
 
-/// The length of the progress bar: it counts thousandths of [0, T].
-const LENGTH: u64 = 1000;
+/// The length of the progress bar: it counts parts of [0, T], as many as a run may have steps.
+const LENGTH: u64 = 1_000_000_000;
 
 /// Shows the task and a progress bar.
 pub fn open(task: &Task) -> Progress {
@@ -134,14 +135,16 @@ pub(super) struct Shown<'a> {
     bars: Option<&'a BTreeMap<String, f64>>,
     /// Whether the errors were measured.
     is_measured: bool,
+    pub(super) mesh: &'a Mesh,
 }
 
 impl<'a> Shown<'a> {
-    fn new(task: &Task, outcome: Option<&'a Outcome>) -> Self {
+    fn new(task: &'a Task, outcome: Option<&'a Outcome>) -> Self {
         let measured = &task.measured;
         let is_measured =
             task.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
-        Self { bars: outcome.map(|of| &of.errors.figures), is_measured }
+        let mesh = task.problem.mesh();
+        Self { bars: outcome.map(|of| &of.errors.figures), is_measured, mesh }
     }
 
     fn bar(&self, name: &str) -> Option<f64> {
@@ -170,7 +173,7 @@ fn supports(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<Str
         let figure = |i: usize, part: &str| shown.figure(of[i].1, &format!("{name}.{part}"), 4);
         let [x, y, moment] = [figure(0, "force_x"), figure(1, "force_y"), figure(2, "moment")];
         let [start, end, at] = ["contact_start_x", "contact_end_x", "acts_at_x"]
-            .map(|of| extremes::place(quantities, &format!("{name}.{of}")));
+            .map(|of| extremes::place(quantities, &format!("{name}.{of}"), shown));
         let contact = match (start, end, at) {
             (Some(start), Some(end), Some(at)) => {
                 format!(" at {at}, contact from {start} to {end}")

@@ -1,6 +1,6 @@
 //! `summary.json`: what a run has found, and what it cost.
 
-use super::{provenance::provenance, task::Task};
+use super::{accuracy::accuracy_note, provenance::provenance, task::Task};
 use serde_json::{Value, json};
 use signorini::{
     estimate::Extremes,
@@ -57,6 +57,9 @@ pub(super) fn summary(
         "units": scene.units,
         "notes": notes,
     });
+    if let Some((reached, _)) = accuracy_note(task, outcome) {
+        summary["reached"] = json!(reached);
+    }
     if let Err(error) = result {
         summary["error"] = json!(error.to_string());
     }

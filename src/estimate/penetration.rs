@@ -5,9 +5,10 @@
 //! if the gap is narrower or more curved than an edge can resolve.
 
 use crate::{
+    evolution::percent,
     fem::{Edge, Elements, parabola},
     mesh::sorted,
-    problem::{DiscreteProblem, NOTED, State},
+    problem::{DiscreteProblem, NOTED, State, rows_of},
     scene::Gap,
 };
 use std::collections::HashMap;
@@ -130,25 +131,31 @@ impl DiscreteProblem {
         (deepest.0, edge.at(points, deepest.1))
     }
 
-    /// A note on contact between the nodes in some states of a run, if there is much. Collective.
+    /// A note on contact between the nodes in some states of a run: if there is much, or if no node of the foundation
+    /// touches. Collective.
     pub(super) fn penetration_note(&self, states: &[&State]) -> Option<String> {
         if !self.has_contact() {
             return None;
         }
         let (mut all, mut displacement) = (Vec::new(), 0.0_f64);
         for state in states {
-            all.extend(self.penetrations(state));
+            let (rows, _) = self.supports.contact.rows(&self.body, state);
+            let limit = |of: &Penetration| {
+                let rows = rows_of(&rows, &self.scene().boundaries[of.boundary].name);
+                if rows.iter().any(|row| row.active == 1) { NOTED } else { RESOLVED }
+            };
+            all.extend(self.penetrations(state).into_iter().map(|of| (of.depth / limit(&of), of)));
             displacement = displacement.max(self.body.nodes.partition.max_norm(&state.u));
         }
-        let deepest = all.iter().max_by(|a, b| a.depth.total_cmp(&b.depth))?;
-        let Penetration { depth, at: [x, y], boundary, .. } = *deepest;
-        (depth > NOTED * displacement).then(|| {
+        let (excess, deepest) = all.into_iter().max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let Penetration { depth, at, boundary, .. } = deepest;
+        (excess > displacement).then(|| {
             format!(
-                "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at ({x:.4}, {y:.4}), \
-                 {:.0} % of the largest displacement: displacements and forces may be far off; \
-                 refine the mesh there, or set accuracy",
+                "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at {}, {} of the largest \
+                 displacement: displacements and forces may be far off; refine the mesh there, or set accuracy",
                 self.scene().boundaries[boundary].name,
-                100.0 * depth / displacement
+                self.mesh().place(at),
+                percent(depth / displacement)
             )
         })
     }

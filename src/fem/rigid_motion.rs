@@ -1,6 +1,7 @@
 //! Infinitesimal rigid motions of a body, and their names in messages.
 
 use super::Body;
+use crate::mesh::place;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -106,11 +107,11 @@ impl fmt::Display for RigidMotion {
         let [ax, ay] = self.translation;
         let length = ax.hypot(ay);
         if self.is_rotation() {
-            // The point at rest: a + θ e_z × (x − x̄) = 0. Rounded before it is printed: no -0.0000.
+            // The point at rest: a + θ e_z × (x − x̄) = 0. A slender bar is √12 r long.
             let [x, y] = self.centre;
             let at_rest = [x - ay / self.rotation, y + ax / self.rotation];
-            let [x, y] = at_rest.map(|v| (1e4 * v).round() / 1e4 + 0.0);
-            return write!(f, "the rotation about ({x:.4}, {y:.4})");
+            let at_rest = place(12_f64.sqrt() * self.radius, at_rest);
+            return write!(f, "the rotation about {at_rest}");
         }
         match [ax, ay].map(|a| a.abs() > NEGLIGIBLE * length) {
             [true, false] => write!(f, "the horizontal translation"),

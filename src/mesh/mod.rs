@@ -80,6 +80,11 @@ impl Mesh {
         ([dy / length, -dx / length], length)
     }
 
+    /// A place as text; see [`place`].
+    pub fn place(&self, at: [f64; 2]) -> String {
+        place(extent(&self.nodes), at)
+    }
+
     /// The edges of the boundary (those of a single triangle), the body on their left.
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let sides = sides(&self.triangles);
@@ -181,6 +186,19 @@ pub fn bounds<'a>(points: impl IntoIterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 
 pub fn extent(points: &[[f64; 2]]) -> f64 {
     let [x, y] = bounds(points).map(|[low, high]| high - low);
     x.max(y).max(0.0)
+}
+
+/// A place as text, to 1e-4 of the power of ten below the `extent` of the body: (6.0000, 4.0000) in a body of 8 m,
+/// (2.5000, 0.0000)e-7 in a body of 0.5 µm.
+pub fn place(extent: f64, at: [f64; 2]) -> String {
+    let exponent = extent.log10().floor() as i32;
+    let scale = 10_f64.powi(if (-3..5).contains(&exponent) { 0 } else { exponent });
+    let decimals = if scale == 1.0 { (4 - exponent) as usize } else { 4 };
+    // Rounded before it is printed: no -0.0000.
+    let unit = 10_f64.powi(decimals as i32);
+    let [x, y] = at.map(|x| (x / scale * unit).round() / unit + 0.0);
+    let power = if scale == 1.0 { String::new() } else { format!("e{exponent}") };
+    format!("({x:.decimals$}, {y:.decimals$}){power}")
 }
 
 /// Twice the signed area of the triangle abc, m², positive when counter-clockwise.

@@ -76,9 +76,12 @@ impl Progress {
             self.bar.set_message(message);
         } else if self.last_line.elapsed() > BETWEEN_LINES {
             self.last_line = Instant::now();
-            let part = 100 * position / self.bar.length().unwrap_or(position).max(1);
-            let seconds = self.started.elapsed().as_secs();
-            let _ = writeln!(io::stderr(), "  {part:>3} % after {seconds} s  {message}");
+            let part = position as f64 / self.bar.length().unwrap_or(position).max(1) as f64;
+            let (percent, seconds) = (100.0 * part, self.started.elapsed().as_secs_f64());
+            let left = seconds / part - seconds;
+            let left = if left.is_finite() { format!(", {left:.0} s left") } else { String::new() };
+            let _ =
+                writeln!(io::stderr(), "  {percent:>3.0} % after {seconds:.0} s{left}  {message}");
         }
     }
 

@@ -49,6 +49,10 @@ impl DiscreteProblem {
             (scene.materials().any(|material| material.density > 0.0)
                 && scene.gravity.iter().all(|g| g.as_constant() == Some(0.0)))
             .then(|| "material.density has no effect without body.gravity".to_owned()),
+            (scene.output.every == Some(0) && !scene.output.times.is_empty()).then(|| {
+                "output.every = 0 writes no frames, also at output.times: only contact.csv has these times"
+                    .to_owned()
+            }),
             (scene.damage.is_some() && scene.time.is_none()).then(|| {
                 "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
             }),
@@ -123,11 +127,9 @@ impl DiscreteProblem {
         let (own, at) = self.body.mesh.smallest_angle();
         let comm = self.body.nodes.partition.comm();
         let (angle, rank) = comm.min_with_rank(own);
-        let [x, y] = at.map(|coordinate| comm.broadcast(rank, coordinate));
+        let at = self.mesh().place(at.map(|coordinate| comm.broadcast(rank, coordinate)));
         (angle < SLIVER).then(|| {
-            format!(
-                "a triangle at ({x:.4}, {y:.4}) has an angle of {angle:.1e}°: mend the mesh there"
-            )
+            format!("a triangle at {at} has an angle of {angle:.1e}°: mend the mesh there")
         })
     }
 }

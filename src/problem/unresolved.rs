@@ -74,9 +74,9 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
             let Some((missed, edge)) = worst.filter(|worst| worst.0 > NOTED * largest) else {
                 continue;
             };
-            let [x, y] = mesh.midpoint(*edge);
+            let at = mesh.place(mesh.midpoint(*edge));
             notes.push(format!(
-                "the displacement of boundary \"{}\" varies within the mesh's edges near ({x:.4}, {y:.4}): \
+                "the displacement of boundary \"{}\" varies within the mesh's edges near {at}: \
                  up to {missed:.1e} {} of it is missed, of {largest:.1e} at most; refine there",
                 boundary.name, scene.units.length
             ));
@@ -86,10 +86,11 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
         let worst = (0..damage.squares.len())
             .max_by(|a, b| damage.squares[*a].total_cmp(&damage.squares[*b]));
         let corners = mesh.triangles[worst.unwrap_or(0)].map(|node| mesh.nodes[node]);
-        let [x, y] = [0, 1].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0);
+        let at = [0, 1].map(|k| corners.iter().map(|corner| corner[k]).sum::<f64>() / 3.0);
+        let at = mesh.place(at);
         let shown = if damage.shown > 1e-9 * damage.integral { damage.shown } else { 0.0 };
         notes.push(format!(
-            "the initial damage varies within the mesh's triangles near ({x:.4}, {y:.4}): ∫(1 − ζ) is {:.3e} \
+            "the initial damage varies within the mesh's triangles near {at}: ∫(1 − ζ) is {:.3e} \
              on this mesh, integrated finely {:.3e}; refine there",
             shown, damage.integral
         ));

@@ -9,6 +9,7 @@ fn an_accuracy_is_reached_and_its_mesh_is_kept() {
     let said = test_directory.run(&["--accuracy", "0.05", "--out", "out/first"]);
     assert!(said.out.contains("accuracy 0.05 reached: P2 on "), "{}", said.out);
     let first = test_directory.summary("out/first");
+    assert_eq!(first["reached"], true);
     let error = first["errors"]["displacement_mesh"].as_f64().unwrap();
     assert!(error > 0.0 && error < 0.05, "{error}");
 

@@ -72,7 +72,8 @@ fn a_signal_ends_a_run_behind_a_step() {
 fn what_is_no_checkpoint_of_this_run_is_refused() {
     let directory = TestDirectory::new();
     // There is none: the run begins.
-    directory.run(&["--set", "time.end=0.1", "--restart"]);
+    let said = directory.run(&["--set", "time.end=0.1", "--restart"]);
+    assert!(said.err.contains("has no checkpoint; the run begins at its start"), "{}", said.err);
     let mut run = started(&directory, "out", &[&LONG[..], &OFTEN].concat());
     wait_until("a checkpoint", || directory.has_checkpoint("out", 10));
     signal(run.id(), "TERM");

@@ -66,7 +66,7 @@ fn a_lever_turns_about_the_edge_of_its_fulcrum() {
             { name = 'top', traction = [0, 'if(x < 1, -1, if(x > 9, -20*t, 0))'] },
          ]",
     );
-    check(&lever, 15.5 / 70.0, "the rotation about (6.0000, ");
+    check(&lever, 15.5 / 70.0, "the rotation about (6.000, ");
 }
 
 /// A block in a groove of two faces, under gravity that turns by t: it leaves the left face when gravity turns away.

@@ -1,7 +1,7 @@
 //! Normals and tributary lengths at the nodes of a boundary.
 
 use crate::{boundary_nodes, common::length};
-use signorini::mesh::{BoundaryNode, Mesh};
+use signorini::mesh::{BoundaryNode, Mesh, place};
 
 /// A polygon around its first node, the centre; boundary edges counter-clockwise.
 fn fan(points: &[[f64; 2]], centre: [f64; 2]) -> (Mesh, Vec<[usize; 2]>) {
@@ -22,6 +22,14 @@ fn total(nodes: &[BoundaryNode]) -> f64 {
 #[track_caller]
 fn close(a: f64, b: f64) {
     assert!((a - b).abs() < 1e-14, "{a} is not {b}");
+}
+
+#[test]
+fn a_place_is_printed_in_proportion_to_the_body() {
+    assert_eq!(place(8.0, [6.0, -1e-9]), "(6.0000, 0.0000)");
+    assert_eq!(place(0.05, [0.01, 0.0]), "(0.010000, 0.000000)");
+    assert_eq!(place(200.0, [130.0, 40.0]), "(130.00, 40.00)");
+    assert_eq!(place(5e-7, [2.5e-7, 0.0]), "(2.5000, 0.0000)e-7");
 }
 
 #[test]
