@@ -1,6 +1,6 @@
 //! Boundary edges of the elements of u: a straight line or a parabola.
 
-use crate::mesh::Face;
+use crate::{ROUNDING, mesh::Face};
 use std::{array, collections::BTreeMap};
 
 /// The nodes of u on an edge x(s), 0 ≤ s ≤ 1.
@@ -32,9 +32,6 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
     let bulge = 4.0 * s * (1.0 - s);
     array::from_fn(|k| p[k] + s * (q[k] - p[k]) + bulge * (m[k] - 0.5 * (p[k] + q[k])))
 }
-
-/// An offset below this fraction of the chord is rounding of coordinates.
-const STRAIGHT: f64 = 1e-12;
 
 /// An estimate of the angle between the normals of boundary edges and of the smooth curve that they
 /// approximate, rad. It is the largest angle between two curved edges that meet smoothly. A parabola through
@@ -82,7 +79,7 @@ impl Edge {
     /// Is the edge curved, beyond rounding?
     fn is_curved(&self, points: &[[f64; 2]]) -> bool {
         let ([x, y], [p, q]) = (self.offset(points), self.ends.map(|node| points[node]));
-        x.hypot(y) > STRAIGHT * (q[0] - p[0]).hypot(q[1] - p[1])
+        x.hypot(y) > ROUNDING * (q[0] - p[0]).hypot(q[1] - p[1])
     }
 
     /// The nodes with the values of their functions φ_i at s.

@@ -1,5 +1,6 @@
 //! When the factor of an earlier matrix is replaced.
 
+use crate::ROUNDING;
 use serde::{Deserialize, Serialize};
 
 /// Compares the iterations lost to the age of a factor with the cost of a new factor.
@@ -28,10 +29,8 @@ pub struct Reduction {
     pub reached: f64,
 }
 
-/// Extra iterations that a solve with an old factor may take: the lower and the upper limit.
-const EXTRA_ITERATIONS: [usize; 2] = [3, 200];
-/// A quotient this close above a whole number counts as that number.
-const ROUNDING: f64 = 1e-9;
+/// A solve with an old factor may take at least this number of extra iterations.
+const EXTRA_ITERATIONS: usize = 3;
 
 impl RefactorisationPolicy {
     /// For a new factor whose `cost` is given in iterations.
@@ -56,11 +55,11 @@ impl RefactorisationPolicy {
     /// is due.
     pub fn iteration_limit(&self, asked: f64) -> Option<usize> {
         let left = self.cost - self.lost as f64;
-        let [least, most] = EXTRA_ITERATIONS;
-        (left > 0.0).then(|| self.fewest(asked).saturating_add((left as usize).clamp(least, most)))
+        (left > 0.0)
+            .then(|| self.fewest(asked).saturating_add((left as usize).max(EXTRA_ITERATIONS)))
     }
 
-    /// ⌈a/ρ⌉.
+    /// ⌈a/ρ⌉; a quotient above a whole number by rounding counts as that number.
     fn fewest(&self, asked: f64) -> usize {
         ((asked / self.rate.unwrap_or(0.0) - ROUNDING).ceil() as usize).max(1)
     }

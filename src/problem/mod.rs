@@ -88,9 +88,6 @@ pub struct DiscreteProblem {
     undivided: Option<(Mesh, Vec<usize>)>,
 }
 
-/// Number of times at which the loads of a run are sampled for their maximum.
-const SAMPLES: usize = 9;
-
 impl DiscreteProblem {
     /// Binds `scene` to `mesh` and checks at sampled times that a solution exists. If the body loses its support at
     /// some time, the scene ends just before.
@@ -112,7 +109,7 @@ impl DiscreteProblem {
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(&conditions.rows);
         let supports = Supports::new(&scene, &body, &conditions);
-        let norms = (scene.sample_times(SAMPLES).into_iter())
+        let norms = (scene.sample_times(notes::TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
         let problem = Self {

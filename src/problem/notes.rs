@@ -17,7 +17,7 @@ const CONTRAST: f64 = 1e5;
 const OVERLAP: f64 = 1e-9;
 /// A note is given if more than this fraction of a load, a displacement or a damage is missed.
 pub(crate) const NOTED: f64 = 0.05;
-/// Approximate number of sample times of surface loads and prescribed displacements.
+/// Approximate number of sample times of loads, for their maximum, and of what the mesh must resolve.
 pub(super) const TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;

@@ -160,7 +160,7 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
     let squares = vec![0.0; triangles.len()];
     let mut found = MissedDamage { squares, square: 0.0, missed: 0.0, integral: 0.0, shown: 0.0 };
     let f = (std::slice::from_ref(initial), 1.0);
-    for part in triangle_parts(&triangles, f, &[0.0], [DEVIATION, MAX_ADDED]).parts {
+    for part in triangle_parts(&triangles, f, &[0.0], MAX_ADDED).parts {
         let (triangle, corners) = part;
         let points = &triangles[triangle];
         let [a, b, c] = [points[0], points[1], points[2]].map(at);

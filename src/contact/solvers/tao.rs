@@ -2,7 +2,7 @@
 
 use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
-    contact::{Bound, ContactError, ContactProblem, Kkt},
+    contact::{Bound, ContactError, ContactProblem},
     linear::{Factor, LinearSolver, Reduction},
     petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, TaoReport, Vector},
 };
@@ -40,8 +40,7 @@ struct Tao {
     kind: String,
 }
 
-/// Maximum number of calls of TAO for one contact problem, and of consecutive calls that do not halve the residual.
-const CALLS: usize = 40;
+/// TAO is called until so many consecutive calls do not halve the residual.
 const STALLED: usize = 7;
 /// Maximum number of iterations in a call.
 const ITERATIONS: usize = 200;
@@ -123,33 +122,32 @@ impl ContactSolver for Tao {
         let mut tao = BoundedQuadratic::new(problem.session, &self.kind)?;
         let mut kept = TaoPreconditioner { k: &stiffness, factor };
         let mut report = ContactReport::default();
-        let (mut reason, mut residuals) = (0, Kkt::default());
         let (mut best, mut stalled) = (f64::INFINITY, 0);
-        for _ in 0..CALLS {
+        let (reason, residuals) = loop {
             let factorisations = kept.factor.factorisations();
             let call = (&mut tao, &mut kept);
             let answer = self.minimise(problem, call, proximal, unit, c)?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
             report.factorisations += kept.factor.factorisations() - factorisations;
-            reason = answer.reason;
             let found = problem.max_norm(c)?;
             if found > 0.0 {
                 (unit, *warm) = (found, vec![found]);
             }
-            residuals = problem.residuals(c)?;
+            let residuals = problem.residuals(c)?;
             if residuals.within(0.5 * problem.tolerance) {
                 return Ok(report);
             }
-            report.false_claims += usize::from(reason > 0 && !residuals.within(problem.tolerance));
+            report.false_claims +=
+                usize::from(answer.reason > 0 && !residuals.within(problem.tolerance));
             let worst = residuals.worst();
             stalled = if worst < 0.5 * best { 0 } else { stalled + 1 };
             best = best.min(worst);
             let good = residuals.within(problem.tolerance) && stalled > 0;
             if worst.is_nan() || stalled == STALLED || good {
-                break;
+                break (answer.reason, residuals);
             }
-        }
+        };
         if residuals.within(problem.tolerance) {
             return Ok(report);
         }

@@ -9,9 +9,8 @@ use crate::{
     scene::{Expression, Scene, SurfaceLoad},
 };
 
-/// Allowed errors of resultants relative to ∫|f|: for assembled surface loads and body forces …
+/// Allowed errors of resultants relative to ∫|f|: for assembled surface loads …
 const DEVIATION: f64 = 1e-6;
-const DEVIATION_IN_BODY: f64 = 1e-5;
 /// … and for surface loads that are only sampled.
 const SAMPLED: f64 = 0.02;
 /// Maximum number of triangle parts added for a body force: one that depends on time, and a constant one.
@@ -122,9 +121,8 @@ impl BodyForce {
         let (times, more) = if in_time { (&times[..], MORE[0]) } else { (&times[..1], MORE[1]) };
         let in_space = force.iter().any(Expression::depends_on_space);
         let triangles = triangle_points(body);
-        let limits = [DEVIATION_IN_BODY, more];
         let Parts { parts, missed } = match in_space {
-            true => triangle_parts(&triangles, (&force, 0.0), times, limits),
+            true => triangle_parts(&triangles, (&force, 0.0), times, more),
             false => {
                 let parts = (0..triangles.len()).map(|triangle| (triangle, WHOLE)).collect();
                 Parts { parts, missed: 0.0 }

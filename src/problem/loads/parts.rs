@@ -21,6 +21,8 @@ pub(crate) type EdgePart = (usize, [f64; 2]);
 /// A part of a triangle: the index of the triangle, and the barycentric coordinates of the part's corners.
 pub(crate) type TrianglePart = (usize, [[f64; 3]; 3]);
 
+/// The allowed deviation in a part of a triangle. An edge has a smaller one: its parts are few.
+const DEVIATION: f64 = 1e-5;
 /// The fraction of ∫|f| that may be hidden in a peak between the sample points.
 const HIDDEN: f64 = 1e-3;
 /// Ends and corners are sampled this far inside, relative to the part, so that no part contains a jump at a node.
@@ -132,12 +134,12 @@ pub(crate) fn edge_parts(
 }
 
 /// Divides quadratic triangles of six points so that `f` − `zero` is integrated at all `times` with errors of about
-/// `deviation` ∫|f − zero|. At most `more` parts are added.
+/// `DEVIATION` ∫|f − zero|. At most `more` parts are added.
 pub(crate) fn triangle_parts(
     triangles: &[[[f64; 2]; 6]],
     (f, zero): (&[Expression], f64),
     times: &[f64],
-    [deviation, more]: [f64; 2],
+    more: f64,
 ) -> Parts<TrianglePart> {
     let whole = (0..triangles.len()).map(|triangle| (triangle, WHOLE));
     let sample = |(triangle, corners): TrianglePart| {
@@ -158,7 +160,7 @@ pub(crate) fn triangle_parts(
         let middle = mean(a, b);
         [(triangle, [c, a, middle]), (triangle, [b, c, middle])]
     };
-    let parts = bisected(whole, [deviation, triangles.len() as f64 + more], sample, halves);
+    let parts = bisected(whole, [DEVIATION, triangles.len() as f64 + more], sample, halves);
     let [integral, missed] = sums(&parts, None);
     if missed <= MISSED * integral {
         return Parts::new(parts);
