@@ -4,7 +4,8 @@ use super::Response;
 use crate::contact::{ContactError, ContactProblem};
 use nalgebra::{DMatrix, DVector};
 
-/// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance: measured best.
+/// ω√(s_min s_max), with s the extreme eigenvalues of the boundary compliance. Half of it changes few
+/// iterations; twice doubles them.
 const OMEGA_COMPLIANCE: f64 = 3.0;
 /// Steps of the Lanczos process that estimates the compliance.
 const LANCZOS: usize = 25;
