@@ -173,14 +173,15 @@ impl DamageStep<'_> {
 
     /// The state of the factor for a checkpoint, if there is one.
     pub(crate) fn factor_state(&mut self) -> Option<FactorState> {
-        self.system.as_mut().map(|(_, system)| system.factor().state()).or(self.loaded.clone())
+        let made = self.system.as_mut().map(|(_, system)| system.factor().state());
+        made.or_else(|| self.loaded.clone())
     }
 
-    /// The damage system of a step of `k` s.
+    /// The damage system of a step of `k` s, with a factor that still pays.
     fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
         let (session, problem, phases) = (self.session, self.problem, self.phases);
-        let system = match self.system.take() {
-            Some((factorised, system)) if factorised == k => system,
+        let mut system = match self.system.take() {
+            Some((own, system)) if own == k => system,
             Some((_, mut system)) => {
                 phases.time("damage matrix", || system.set_step(k))?;
                 system
@@ -190,10 +191,15 @@ impl DamageStep<'_> {
                     (&problem.body, problem.mass(), problem.diffusions());
                 let new = || DamageSystem::new(session, body, mass, &diffusions, k);
                 let mut system = phases.time("damage matrix", new)?;
-                self.loaded.take().into_iter().for_each(|state| system.factor().set_state(state));
+                if let Some(state) = self.loaded.take() {
+                    system.factor().set_state(state);
+                }
                 system
             }
         };
+        if system.factor().is_due() {
+            phases.time("damage factor", || system.factorise())?;
+        }
         Ok(&mut self.system.insert((k, system)).1)
     }
 }

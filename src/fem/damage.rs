@@ -159,6 +159,14 @@ impl DamageSystem {
         Ok(())
     }
 
+    /// Makes a new factor. If the matrix is not positive definite there is none, and the solves fail.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
+    pub(crate) fn factorise(&mut self) -> Result<(), PetscError> {
+        self.solver.factorise(LinearSystem::of(&self.matrix)).map(drop)
+    }
+
     /// The factor, which a checkpoint keeps.
     pub(crate) fn factor(&mut self) -> &mut Factor {
         self.solver.factor()

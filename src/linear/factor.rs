@@ -149,6 +149,8 @@ impl Factor {
         self.scaling = Scaling::of_factored(matrix)?;
         let cost = cost.unwrap_or(UNKNOWN_COST);
         self.policy = definite.then(|| RefactorisationPolicy::new(cost));
+        // A new factor replaces that of a checkpoint.
+        self.loaded = false;
         self.factorisations += usize::from(definite);
         Ok(())
     }
@@ -215,6 +217,11 @@ impl Factor {
     /// Is there a factor?
     pub(crate) fn exists(&self) -> bool {
         self.policy.is_some()
+    }
+
+    /// Is there no factor, or does a new one cost less?
+    pub(crate) fn is_due(&self) -> bool {
+        self.iteration_limit(0.0).is_none()
     }
 
     /// The largest number of iterations for a solve with this factor that divides the residual by e^`asked`.

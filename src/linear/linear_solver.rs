@@ -156,12 +156,12 @@ impl LinearSolver {
         self.norm.is_finite() && self.norm <= limit
     }
 
-    /// Makes a new factor if one is due for a solve to `limit`. Returns the number of factorisations.
+    /// Makes a new factor if one is due. Returns the number of factorisations.
     ///
     /// # Errors
     /// PETSc or CHOLMOD failed.
-    pub fn prepare(&mut self, system: LinearSystem, limit: f64) -> Result<usize, PetscError> {
-        let due = self.factor.iteration_limit(self.asked(limit)).is_none();
+    pub fn prepare(&mut self, system: LinearSystem) -> Result<usize, PetscError> {
+        let due = self.factor.is_due();
         if due {
             self.factorise(system)?;
         }

@@ -104,7 +104,7 @@ impl ActiveSet {
             return answer(problem, elastic, c);
         }
         let (start, before) = (AtBounds::new(problem, c, Vec::new())?, active.to_vec());
-        report.factorisations += elastic.prepare(system, limit)?;
+        report.factorisations += elastic.prepare(system)?;
         let found = match elastic.condense(system)? {
             Some(mut condensed) => {
                 pivot_condensed(problem, active, &start, &mut condensed, report)?

@@ -189,7 +189,7 @@ fn solve_condensed(
     let mut p = problem.at_bounds(elastic.residual())?;
     for _ in 0..OUTER {
         let start = problem.at_bounds(c)?;
-        report.factorisations += elastic.prepare(system, limit)?;
+        report.factorisations += elastic.prepare(system)?;
         let condensed = elastic.condense(system)?;
         let mut condensed = condensed.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
         p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;
