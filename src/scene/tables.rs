@@ -56,11 +56,6 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     for (name, law) in laws {
         surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
     }
-    if surfaces.contains_key("material") {
-        let problem =
-            "has the name of the rest of the body in the results; give the surface another name";
-        found.note("material.material", problem);
-    }
     let degree = degree.unwrap_or(if accuracy.is_some() { 2.0 } else { 1.0 });
     Some(Scene {
         path: path.to_owned(),
@@ -109,6 +104,10 @@ fn check_times(
 fn surfaces<T: DeserializeOwned>(table: toml::Table) -> Result<Vec<(String, T)>, Diagnostic> {
     let (named, own): (Vec<_>, Vec<_>) = table.into_iter().partition(|(_, value)| value.is_table());
     let with_own = |(name, value): (String, toml::Value)| {
+        if name == "material" {
+            let problem = "has the name of the rest of the body in the results; give the surface another name";
+            return Err(("material", problem.to_owned()));
+        }
         let mut all: toml::Table = own.iter().cloned().collect();
         all.extend(value.as_table().cloned().unwrap_or_default());
         Ok((name, all.try_into().map_err(is_wrong)?))
