@@ -29,7 +29,8 @@ pub struct Session {
 
 impl Session {
     /// Starts PETSc with `options` (as on a PETSc command line). If PETSc runs already, waits until no other
-    /// session uses it, and adds `options` to its options database.
+    /// session uses it, and adds `options` to its options database. MPI changes the environment of the process as it
+    /// starts, and no other thread may read it meanwhile.
     ///
     /// # Errors
     /// PETSc or MPI could not be initialised, or rejected an option.

@@ -14,7 +14,8 @@ use signorini::{
     petsc::Session,
     scene::Scene,
 };
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{fs, path::Path};
+use tempfile::TempDir;
 
 /// A damage law of which every constant counts.
 pub const DAMAGE_LAW: DamageLaw = DamageLaw {
@@ -44,7 +45,7 @@ pub fn distorted(n: usize) -> Mesh {
 
 /// The unit square as gmsh triangulates it.
 pub fn unstructured(size: f64) -> Mesh {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder();
     let geo = folder.path().join("square.geo");
     let corners = "Point(1) = {0,0,0}; Point(2) = {1,0,0}; Point(3) = {1,1,0}; Point(4) = {0,1,0};";
     let sides = "Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1};";
@@ -54,17 +55,17 @@ pub fn unstructured(size: f64) -> Mesh {
         .collect();
     let body = "Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};";
     fs::write(&geo, [corners, sides, body, &named].join("\n")).unwrap();
-    meshed(&geo, &[("size".to_owned(), size)].into(), Order::Linear)
+    mesh::load(&geo, &[("size".to_owned(), size)].into(), Order::Linear).unwrap()
 }
 
 /// Both orders of the displacements.
 pub const ORDERS: [Order; 2] = [Order::Linear, Order::Quadratic];
 
-/// A mesh by gmsh. It cannot be started while MPI, as it starts in another test, changes the
-/// environment: so this waits for its turn at a session (and must not be called by who has one).
-fn meshed(file: &Path, parameters: &BTreeMap<String, f64>, order: Order) -> Mesh {
+/// A folder of temporary files. Its place and gmsh are found by the environment, which MPI changes while it starts:
+/// so this starts it, or waits until another test has done so (and must not be called by who has a session).
+fn folder() -> TempDir {
     drop(Session::start(&[]).unwrap());
-    mesh::load(file, parameters, order).unwrap()
+    tempfile::tempdir().unwrap()
 }
 
 /// `mesh` with its nodes moved; the map must keep the orientation.
@@ -153,7 +154,7 @@ pub fn shipped(name: &str, sets: &[&str]) -> DiscreteProblem {
 pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> DiscreteProblem {
     let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
     // Meshes appear beside the geometry, so it is copied.
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder();
     for entry in fs::read_dir(geo).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "geo" || e == "toml") {
@@ -168,7 +169,7 @@ pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> Discret
         assert!(geometry.contains(old));
         fs::write(&scene.mesh.file, geometry.replace(old, new)).unwrap();
     }
-    let mesh = meshed(&scene.mesh.file, &scene.mesh.parameters, scene.order);
+    let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters, scene.order).unwrap();
     DiscreteProblem::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
 }
 
