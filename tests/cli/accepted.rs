@@ -5,6 +5,12 @@ use serde_json::Value;
 use signorini::contact::{REGISTRY, SOLVERS};
 use std::process::Stdio;
 
+/// The keys of `summary.json`, which scripts of users read.
+const KEYS: &str = "provenance scene title solver ranks nodes triangles contact_nodes steps end_time zeta_min zeta_mean \
+    displacement_max work contact_force active_nodes quantities kkt errors wall_seconds seconds_per_step phases \
+    boundaries units notes von_mises_max extremes principal_max principal_min pressure_max contact_length \
+    peak_megabytes stopped_by stopped_at stopped_uncertainty collapse";
+
 fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
@@ -21,6 +27,8 @@ fn summary() {
     assert!(said.out.lines().all(|line| line.trim_end() == line), "blanks at line ends");
 
     let summary = test_directory.summary("out/scene");
+    let keys: Vec<&str> = summary.as_object().expect("an object").keys().map(|k| &**k).collect();
+    assert_eq!(keys.join(" "), KEYS);
     let kkt = summary["kkt"].as_object().expect("an object");
     assert!(kkt.len() == 4 && kkt.values().all(|v| number(v) <= 1e-10));
     assert_eq!(summary["scene"], "scene");
