@@ -47,7 +47,7 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// Of no state.
+    /// No extremes yet.
     pub(super) fn none(comm: Communicator) -> Self {
         Self { comm, of_points: vec![], fields: vec![], contact_lengths: vec![], ends: vec![] }
     }
@@ -124,7 +124,7 @@ impl Extremes {
     /// The extremes of stresses and pressures with the names of the singular `points` of the boundary near which they are,
     /// within three edges. A singular stress is large at its point itself, if it is known there. Collective.
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
-        /// With half of it nothing changes; with twice smooth extremes count as singular.
+        /// On six bodies half of it changed nothing; twice of it changed meshes.
         const EDGES: f64 = 3.001;
         let named = |(i, extreme): (usize, &Extreme)| {
             let near =

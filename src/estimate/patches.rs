@@ -8,7 +8,7 @@ use crate::{
 use nalgebra::{Matrix6x3, SMatrix, SVector, Vector3, Vector6};
 
 /// Triangles needed to fit at a vertex; with fewer, the fits of its neighbours are averaged.
-/// With half of them meshes have half as many triangles again; with twice some bars fail.
+/// On 15 scenes, with half of them meshes have half as many triangles again; with twice a bar fails.
 const ENOUGH: usize = 4;
 
 /// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).

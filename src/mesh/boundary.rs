@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-/// Edges whose normals differ by more than this angle (radians) meet in a corner. Half and twice
-/// change which points of some bodies count as singular.
+/// Edges whose normals differ by more than this angle (radians) meet in a corner. On six bodies half
+/// and twice of it changed figures of one.
 pub const CORNER_ANGLE: f64 = std::f64::consts::PI / 6.0;
 
 /// A node of a set of boundary edges.

@@ -19,8 +19,7 @@ pub struct Anderson {
     comm: Communicator,
 }
 
-/// The number of mixed iterates. Half of them take three times as many iterations; twice save a third of the iterations,
-/// but no seconds.
+/// The number of mixed iterates. Half of them take three times as many iterations; twice save a third.
 const DEPTH: usize = 10;
 const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.

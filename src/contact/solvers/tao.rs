@@ -40,7 +40,7 @@ struct Tao {
     kind: String,
 }
 
-/// TAO is called until so many consecutive calls do not halve the residual.
+/// TAO gives up after this number of consecutive calls, none of which halved the residual.
 const STALLED: usize = 7;
 /// Maximum number of iterations in a call.
 const ITERATIONS: usize = 200;

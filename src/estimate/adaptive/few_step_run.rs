@@ -11,8 +11,8 @@ use crate::{
 };
 use std::cmp::Ordering;
 
-/// Number of steps of the run, and of evenly spread times at which its errors are estimated. Half of them save
-/// up to an eighth of the seconds, but some meshes have a tenth more triangles; twice take a quarter more seconds.
+/// Number of steps of the run, and of evenly spread times at which its errors are estimated. On six bodies,
+/// half of them make a tenth more triangles; with twice a bar fails.
 pub const INSTANTS: usize = 8;
 /// Number of these times in a run that is only compared with another.
 pub(super) const FEW: usize = 3;

@@ -28,8 +28,8 @@ use crate::{
 };
 use std::collections::BTreeSet;
 
-/// Maximum of error over change, for P1 and P2. With half of it bars fail on every second body; with twice meshes have
-/// twice as many triangles.
+/// Maximum of error over change, for P1 and P2. On six bodies that are not shipped, with half of it six bars fail;
+/// with twice meshes have twice as many triangles.
 const ERROR_OVER_CHANGE: [f64; 2] = [4.0, 2.5];
 /// Triangles at points are h/2^this. With half of them some meshes have a quarter fewer
 /// triangles; twice of them change few meshes.

@@ -53,7 +53,7 @@ impl Accuracy {
                 "at t = {time:.4e}, the active contact nodes alone do not support the body: the error of \
                  the displacements cannot be estimated"
             )),
-            (_, _) => (displacement > Self::promised(tolerance)).then(|| {
+            _ => (displacement > Self::promised(tolerance)).then(|| {
                 format!(
                     "the stiffness is ill-conditioned (a slender or very soft part?): displacements \
                      at t = {time:.4e} are exact only to about {displacement:.0e} of the largest, \

@@ -30,7 +30,8 @@ pub(super) struct ErrorControl<'a> {
     damage: [f64; 2],
 }
 
-/// The longest step, as a fraction of the run. Half of it takes a quarter more steps; with twice some bars fail.
+/// The longest step, as a fraction of the run. Half of it takes a quarter more steps; with twice a bar
+/// of six bodies fails.
 const LONGEST: f64 = 0.05;
 /// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run.
 /// Shorter steps would not follow a jump either.

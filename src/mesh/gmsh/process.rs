@@ -29,8 +29,8 @@ const VERSION: &str =
     "Printf(\"gmsh %g.%g.%g\", GMSH_MAJOR_VERSION, GMSH_MINOR_VERSION, GMSH_PATCH_VERSION)";
 
 /// Runs gmsh with `arguments` on the file `input` and then on a file with the text `last`. Returns the bytes
-/// of the MSH 4.1 file that gmsh makes, with gmsh's version as a comment at its end. If `bytes` are given, they replace the contents of `input`. `task`
-/// completes "gmsh could not …" in messages.
+/// of the MSH 4.1 file that gmsh makes, with gmsh's version as a comment at its end. If `bytes` are given, they replace
+/// the contents of `input`. `task` completes "gmsh could not …" in messages.
 ///
 /// # Errors
 /// gmsh is missing, takes too long or reports an error, or a signal came.

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
-/// Half of it takes half as many seconds again for loads that move; twice changes nothing.
+/// On 12 scenes, with half of it meshes have an eighth more triangles; twice changes little.
 const DEVIATION: f64 = 0.05;
 /// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;
