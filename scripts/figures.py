@@ -37,6 +37,7 @@ from principal import draw_principal
 from reading import evenly, read_results, states
 from results import telling
 from setting import draw_setting
+from signorini_summaries import folders_of
 
 FIGURES = {
     "setting": draw_setting,
@@ -182,8 +183,7 @@ def main(prog=None):
     arguments = arguments_of(prog)
     if arguments.width:
         drawing.set_width(arguments.width)
-    # The table of a study stands beside its folders.
-    arguments.folders = [folder for folder in arguments.folders if not os.path.isfile(folder)] or arguments.folders
+    arguments.folders = folders_of(arguments.folders)
     if arguments.line or arguments.along:
         with telling() as problems:
             for path in draw_curves(arguments, styled):

@@ -30,7 +30,7 @@ from maps import draw_state
 from reading import evenly, read_results, states
 from report_pdf import FULL, HIGHEST, SPACE, pages_of
 from results import telling
-from signorini_summaries import bars, unit_of, value_of
+from signorini_summaries import bars, folders_of, unit_of, value_of
 from table import text_of
 
 # The largest number of frames of the slider.
@@ -286,7 +286,7 @@ def main(prog=None):
     parser.add_argument("--author", default="")
     parser.add_argument("--date", default="")
     arguments, failed = parser.parse_args(), False
-    for folder in arguments.folders:
+    for folder in folders_of(arguments.folders):
         with telling() as problems:
             results = read_results(folder)
             everything = states(results, evenly(results.frames, 400))

@@ -25,6 +25,11 @@ def summary_of(folder):
         raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
 
 
+def folders_of(names):
+    """`names` without files: the table of a study stands beside its folders."""
+    return [name for name in names if not Path(name).is_file()] or names
+
+
 def option_of(summary, name):
     """The values of an option in the command of a run."""
     words = summary.get("provenance", {}).get("command", [])

@@ -8,10 +8,9 @@ summary.json with their units and error bars.
 import argparse
 import csv
 import sys
-from pathlib import Path
 
 from bars import barred
-from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
+from signorini_summaries import COLUMNS, folders_of, rows_of, summary_of, unknown
 
 
 def text_of(value):
@@ -75,8 +74,7 @@ def main(prog=None):
     parser.add_argument("--csv", action="store_true", help="as CSV with all digits; error bars are columns NAME.bar")
     arguments = parser.parse_args()
     found, failed = {}, False
-    # The table of a study stands beside its folders.
-    for folder in [folder for folder in arguments.folders if not Path(folder).is_file()]:
+    for folder in folders_of(arguments.folders):
         try:
             found[folder] = summary_of(folder)
         except ValueError as error:

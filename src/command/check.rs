@@ -150,7 +150,7 @@ fn unknowns(problem: &DiscreteProblem) -> String {
 }
 
 /// A number as text with five digits.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
     match rounded.abs() {
         size if size == 0.0 || (1e-3..1e7).contains(&size) => rounded.to_string(),

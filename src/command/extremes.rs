@@ -39,8 +39,11 @@ pub(super) fn contact(extremes: &Extremes, units: &Units, shown: &Shown) -> Vec<
         let of =
             name.strip_suffix(".contact_length").map_or_else(String::new, |of| format!("{of}: "));
         let (length, unit) = (shown.figure(*length, name, 6), &units.length);
-        let largest = extreme(pressure, &units.stress, shown);
-        row("", format!("{of}length {length} {unit}, largest pressure {largest}"))
+        let largest = match pressure.value {
+            0.0 => String::new(),
+            _ => format!(", largest pressure {}", extreme(pressure, &units.stress, shown)),
+        };
+        row("", format!("{of}length {length} {unit}{largest}"))
     };
     pressures.zip(&extremes.contact_lengths).map(line).collect()
 }

@@ -1,6 +1,6 @@
 //! The output of a run at the terminal: its task, a progress bar, and the result in a few lines.
 
-use super::{extremes, task::Task};
+use super::{check::short, extremes, task::Task};
 use signorini::{
     estimate::{Adapted, Extremes},
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
@@ -12,10 +12,15 @@ use signorini::{
 use std::{
     collections::BTreeMap,
     io::{self, Write},
+    num::NonZero,
+    thread,
 };
 
 /// The length of the progress bar: it counts parts of [0, T], as many as a run may have steps.
 const LENGTH: u64 = 1_000_000_000;
+
+/// The number of nodes from which two ranks pay: 100,000 unknowns of the displacements (SPEED.md, section 2).
+const MANY_NODES: usize = 50_000;
 
 /// Shows the task and a progress bar.
 pub fn open(task: &Task) -> Progress {
@@ -24,6 +29,8 @@ pub fn open(task: &Task) -> Progress {
     let ranks = partition.comm().size();
     if ranks > 1 {
         mesh += &format!(", on {ranks} ranks");
+    } else if partition.total() >= MANY_NODES && cores() > 1 {
+        mesh += ", on one core (several: mpiexec -n 2 signorini run …)";
     }
     let solver = match task.contact_nodes {
         0 => format!("{} (no contact: one linear solve a step)", task.solver),
@@ -37,6 +44,11 @@ pub fn open(task: &Task) -> Progress {
     let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
     progress.show(0, "the first solve".to_owned());
     progress
+}
+
+/// The number of cores that this process may use, 1 if it is not known.
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 /// Shows a mesh of the adaptation with its errors.
@@ -68,8 +80,12 @@ pub fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
 /// Shows an accepted step of a run to t = `end`.
 pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     let message = format!(
-        "step {}  t = {:.4}  min ζ = {:.6}  active {}  iterations {}",
-        record.step, record.time, record.zeta_min, record.active_nodes, record.iterations
+        "step {}  t = {}  min ζ = {:.6}  active {}  iterations {}",
+        record.step,
+        short(record.time),
+        record.zeta_min,
+        record.active_nodes,
+        record.iterations
     );
     bar.show((LENGTH as f64 * record.time / end) as u64, message);
 }
