@@ -91,11 +91,6 @@ impl NodalBases {
         self.transform(field, |_, inverse| inverse.transpose());
     }
 
-    /// Forces conjugate to u from forces conjugate to c: Dᵀ r, in place.
-    pub fn force_to_global(&self, field: &mut [f64]) {
-        self.transform(field, |d, _| d.transpose());
-    }
-
     fn transform(
         &self,
         field: &mut [f64],
