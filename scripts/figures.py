@@ -82,7 +82,7 @@ def arguments_of(prog):
         "draw ζ, as the paper does, or the loss 1 − ζ (default: ζ if it falls below 0.9)"))
     parser.add_argument("--abscissa", metavar="COLUMN", help=(
         "column of history.csv over which force-displacement draws the forces: time, displacement_max, work, …"))
-    parser.add_argument("--range", type=numbers(2), metavar="A,B", help="stresses at the ends of the colour bars, Pa")
+    parser.add_argument("--range", type=numbers(2), metavar="A,B", help="stresses at the ends of the colour bars, Pa; compression is positive")
     parser.add_argument("--material", metavar="NAME", help=(
         "maps of one material only: the name of a surface, or material for the others"))
     parser.add_argument("--contours", action="store_true", help="contour lines of the stress and ζ")

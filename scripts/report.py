@@ -37,6 +37,8 @@ from table import text_of
 FRAMES = 10
 # The limits of the model, for the head of the report.
 MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
+# Places, which the PDF leaves out: it has two pages.
+PLACES = [f".{name}_{axis}" for name in ("contact_start", "contact_end", "peak") for axis in "xy"]
 # What the processes draw, by name.
 TASKS = {}
 # Values of summary.json for the last state, with their names.
@@ -127,20 +129,28 @@ def template():
     return [Template(text) for text in spec.loader.get_data(path).decode().split("<!-- slider -->\n")]
 
 
-def facts(results):
-    """The values of summary.json for the last state, and the given quantities by name."""
+def facts(results, left_out=()):
+    """The values of summary.json for the last state, and the given quantities by name. Names that end with one of
+    `left_out` are left out."""
     summary, units, errors = results.summary, results.units, bars(results.summary)
+    extremes = summary.get("extremes") or {}
+    has_one = sum(name.endswith(".contact_length") for name in summary.get("quantities", {})) == 1
 
     def text(name, value):
+        # A lone foundation has the length and the largest pressure of all contact.
+        of_all = name.rpartition(".")[2] if has_one and name.endswith((".contact_length", ".pressure_max")) else name
+        if (extremes.get(name) or extremes.get(of_all) or {}).get("singular"):
+            return f"{value:.2g}, singular"
         is_rounded = summary.get("stopped_at") is not None and isinstance(value, float)
-        return barred(value, errors.get(name)) or (three_digits(value) if is_rounded else value)
+        return barred(value, errors.get(of_all)) or (three_digits(value) if is_rounded else value)
 
     rows = [(name, text(key, summary[key]), unit_of(key, units))
             for key, name in FACTS.items() if summary.get(key) is not None]
     # The extremes in each of several materials.
-    inside = {name: of["value"] for name, of in (summary.get("extremes") or {}).items() if "." in name}
+    inside = {name: of["value"] for name, of in extremes.items() if "." in name}
     return rows + [(name, text(name, value), unit_of(f"quantities.{name}", units))
-                   for name, value in {**summary.get("quantities", {}), **inside}.items()]
+                   for name, value in {**summary.get("quantities", {}), **inside}.items()
+                   if not name.endswith(tuple(left_out))]
 
 
 def governing(everything, units):
@@ -260,7 +270,7 @@ def write_pdf(path, results, arguments, everything):
         pages.text(title, size=14, weight="bold")
         pages.text("\n".join(filter(None, (byline, subtitle, MODEL))))
         pages.text(ending, color=RED, weight="bold")
-        pages.table("Last state", facts(results))
+        pages.table("Last state", facts(results, PLACES))
         drawing.set_width(pages.room)
         draw["setting"](figure=pages)
         pages.table("Governing values", governing(everything, results.units))
@@ -269,7 +279,8 @@ def write_pdf(path, results, arguments, everything):
         pages.table("Made by", provenance(summary)[:-1])
         pages.text("\n".join(f"Note: {note}" for note in summary.get("notes", [])))
         pages.end()
-        pages.start(HIGHEST)
+        # A static solve has no histories: three rows of pictures instead of four.
+        pages.start(HIGHEST if len(everything) > 1 else 4 / 3 * HIGHEST)
         for name in ("deformed", "pressure", "stress-damage", "principal-stresses", "force-displacement",
                      "damage-history"):
             drawing.set_width(FULL if "stress" in name else 0.5 * (FULL - SPACE))

@@ -287,6 +287,7 @@ def main():
             return
         out = arguments.out or ROOT / "out" / "converge" / study.name
         out.mkdir(parents=True, exist_ok=True)
+        print(f"{study.name}: linear triangles (P1), Euler's scheme", flush=True)
         rows = []
         for row in study.rows():
             rows.append(row)

@@ -54,9 +54,11 @@ fn cores() -> usize {
 /// Shows a mesh of the adaptation with its errors.
 pub fn adapting(mesh: &Adapted, accuracy: f64) {
     let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
+    // The norms come first, and are not repeated.
+    let worst = mesh.worst.iter().filter(|(name, _)| name != "damage" && name != "displacement");
     let errors = [("error of u", Some(mesh.error)), ("damage", mesh.damage_error)]
         .into_iter()
-        .chain(mesh.worst.iter().map(|(name, error)| (&**name, Some(*error))))
+        .chain(worst.map(|(name, error)| (&**name, Some(*error))))
         .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))));
     let text = format!(
         "mesh {rounds}: {triangles} triangles, {unknowns} unknowns, {} (accuracy {})",

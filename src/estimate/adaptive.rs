@@ -261,9 +261,12 @@ fn refined(
         let errors = measured.map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
         let exhausted = rounds >= MAX_ROUNDS || 4 * triangles > MAX_TRIANGLES;
         let limit = || "the limit on rounds or triangles is reached".to_owned();
-        let short = failed.or_else(|| progress.stuck(&errors));
+        let grown = measured.and_then(|measured| measured.grown(&scene.accuracy_of));
+        let is_grown = grown.is_some();
+        let short = failed.or(grown).or_else(|| progress.stuck(&errors));
         let short = short.or(exhausted.then(limit));
-        let reached = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
+        let within = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
+        let reached = within && !is_grown;
         let ends = reached || short.is_some();
         let adapted = round.adapted(measured, rounds, short.filter(|_| !reached));
         seen(&adapted);

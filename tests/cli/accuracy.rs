@@ -127,6 +127,9 @@ fn a_stress_that_is_zero_needs_no_finer_mesh_and_a_singular_one_is_told() {
         let triangles = directory.summary("out/scene")["triangles"].as_u64().unwrap();
         assert!(triangles < 20_000, "{corner}: {triangles} triangles");
     }
+    let said = directory.run(&["--accuracy", "0.02", "--accuracy-of", "von_mises_max,work"]);
+    let told = "NOT reached (von_mises_max is singular: it grows as the mesh is refined";
+    assert!(said.out.contains(told), "{}", said.out);
 }
 
 /// A quarter of a ring with radii 1 and 2 under a pressure of 1 in its bore: at the bore Lamé's displacement is

@@ -183,6 +183,12 @@ impl Measurement {
         self.grows.extend(names.iter().cloned());
     }
 
+    /// Why a figure in `names` has no accuracy, if one grows as the mesh is refined.
+    pub(super) fn grown(&self, names: &[String]) -> Option<String> {
+        let name = names.iter().find(|name| self.grows.contains(name))?;
+        Some(format!("{name} is singular: it grows as the mesh is refined; ask for other figures"))
+    }
+
     /// The errors of a run on the mesh.
     pub(super) fn result(&self) -> Measured {
         let stop = self.stop.map(|[error, _]| error).filter(|error| error.is_finite());
