@@ -31,11 +31,7 @@ impl Outcome {
                     "ζ_* was reached too early or wrongly: the sources allow no ζ below {least:.4}"
                 )
             }),
-            self.bound_violation.note(
-                problem.mass(),
-                problem.slowest_diffusion(),
-                1.0 - self.last.record.zeta_min,
-            ),
+            self.bound_violation.note(problem.mass(), problem.slowest_diffusion()),
             self.unconstrained.as_ref().map(|(steps, times, motion)| {
                 let [first, last] = times.map(rounded);
                 let when = match steps {

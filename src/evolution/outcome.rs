@@ -161,15 +161,9 @@ impl BoundViolation {
         }
     }
 
-    /// A note on the violation and its cure; `slowest` is min κ/h² over the body, 1/s. There is none where the violation
-    /// is far smaller than the largest `damage` 1 − ζ.
-    pub fn note(&self, mass: Mass, slowest: f64, damage: f64) -> Option<String> {
-        /// Smaller parts of the damage are below all accuracies that are asked for.
-        const SMALL: f64 = 1e-4;
+    /// A note on the violation and its cure; `slowest` is min κ/h² over the body, 1/s.
+    pub fn note(&self, mass: Mass, slowest: f64) -> Option<String> {
         let (step, time) = self.first?;
-        if self.above.max(self.below) <= SMALL * damage {
-            return None;
-        }
         let sides = [("above", self.above), ("below", self.below)].into_iter();
         let sides = sides.filter(|(_, by)| *by > MAX_BALANCE);
         let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
