@@ -39,7 +39,7 @@ help:
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make figures    the figures of every run in out/, again; or ARGS="--animate --format svg"'
-	@echo 'make test       format, lints, documentation, tests (5 minutes)'
+	@echo 'make test       format, lints, documentation, tests (4 minutes)'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
@@ -86,7 +86,7 @@ figures: deps
 
 # `tee` shows the output; the exit code is that of the tests.
 test: deps
-	@echo 'make test: about 5 minutes on two cores, once the dependencies are compiled'
+	@echo 'make test: about 4 minutes on two cores, 2.5 once the dependencies are compiled'
 	cargo fmt --all --check
 	cargo clippy --locked --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
