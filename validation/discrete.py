@@ -146,7 +146,7 @@ class Discrete:
 
     def _contact_faces(self):
         """Per row: (node, normal, length, gaps). The normal is fixed, or that of a face. Where curves meet smoothly there is
-        one row with the mean normal and the gaps of both."""
+        one row with the mean normal and the gaps of both, each with its length."""
         rows = {}
         for boundary in self.boundaries:
             if "gap" not in boundary:
@@ -155,13 +155,18 @@ class Discrete:
             for node, faces in self.faces(boundary["name"]).items():
                 if fixed is not None:
                     faces = [(fixed, sum(length for _, length in faces))]
-                rows.setdefault(node, []).extend((n, w, [gap]) for n, w in faces)
+                rows.setdefault(node, []).extend((n, w, [(gap, w)]) for n, w in faces)
         return [(node, n, w, gaps) for node, parts in sorted(rows.items()) for n, w, gaps in merged(parts, CORNER)]
 
     def contact_rows(self, t):
-        """u·ν ≤ g at time t, with the smallest of several gaps."""
-        at = lambda node, gaps: min(float(g.at(self.points[[node]], t)[0]) for g in gaps)
-        return as_rows([(node, n, at(node, gaps), w) for node, n, w, gaps in self._gaps])
+        """u·ν ≤ g at time t, with the smallest of several gaps. The lengths of the others bear no pressure."""
+        rows = []
+        for node, n, length, gaps in self._gaps:
+            values = [(float(g.at(self.points[[node]], t)[0]), w) for g, w in gaps]
+            least = min(value for value, _ in values)
+            bearing = sum(w for value, w in values if value - least <= 1e-12 * length)
+            rows.append((node, n, least, bearing))
+        return as_rows(rows)
 
     def _prescribed(self):
         """Per row: (node, direction, expression), with None for the 0 of a symmetry axis."""
