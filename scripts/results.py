@@ -239,12 +239,15 @@ class Results:
 
 
 def of_material(results):
-    """The results with values outside the chosen material that do not enter the scales of maps, without error bars."""
+    """The results with values outside the chosen material that do not enter the scales of maps, and with its extremes."""
     if results.material is None:
         return results
+    name = f"{results.material}."
+    own = lambda of: {key.removeprefix(name): value for key, value in (of or {}).items() if key.startswith(name)}
     inside = np.isin(np.arange(len(results.nodes)), results.pieces.elements[results.shown])
     return replace(
-        results, summary={**results.summary, "errors": None, "extremes": None},
+        results, summary={**results.summary, "errors": {"figures": own(bars(results.summary))},
+                          "extremes": own(results.summary.get("extremes"))},
         zeta=np.where(inside, results.zeta, results.zeta[inside].max()), von_mises=results.von_mises * inside,
         principal=results.principal * inside[:, None])
 
