@@ -4,6 +4,7 @@ template of the report as JSON on standard input. It writes no files of its own.
 import importlib
 import json
 import os
+import signal
 import sys
 from importlib.abc import InspectLoader, MetaPathFinder
 from importlib.util import spec_from_loader
@@ -25,6 +26,15 @@ class Sources(MetaPathFinder, InspectLoader):
         return self.sources[path].encode()
 
 
+def stop(number, frame):
+    """Ends as Ctrl-C does, with the exit code of the signal."""
+    raise KeyboardInterrupt(128 + number)
+
+
+for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    # `nohup` lets SIGHUP be ignored.
+    if signal.getsignal(number) is not signal.SIG_IGN:
+        signal.signal(number, stop)
 sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
 # Modules in the working directory must not be imported.
 sys.path = [path for path in sys.path if path]
@@ -32,8 +42,8 @@ name = sys.argv.pop(1)
 try:
     code = importlib.import_module(name).main(f"signorini {name}")
     sys.stdout.flush()
-except KeyboardInterrupt:
-    code = 130
+except KeyboardInterrupt as stopped:
+    code = stopped.args[0]
 except BrokenPipeError:
     # The reader of the output has closed the pipe.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -20,6 +20,7 @@ import fcntl
 import itertools
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -133,30 +134,49 @@ def claim(locks, folder):
         fcntl.lockf(locks, fcntl.LOCK_UN, 1, place)
 
 
-def run(command, runs):
-    """Runs the program beside `runs` - 1 others; returns the error, "" if there is none."""
+def run(command, runs, running):
+    """Runs the program beside `runs` - 1 others, as one of the processes `running`; returns the error, "" if there is
+    none. Signals of the terminal come to it by this process alone."""
     # Each run has a core of its own.
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "SIGNORINI_RUNS": str(runs)}
     command = [os.environ["SIGNORINI"], *command]
-    ended = subprocess.run(command, capture_output=True, text=True, env=environment)
-    return ended.stderr.strip() if ended.returncode else ""
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment,
+                          process_group=0) as process:
+        running.add(process)
+        error = process.communicate()[1]
+        running.discard(process)
+    return error.strip() if process.returncode else ""
+
+
+@contextmanager
+def stopping(pool, running):
+    """On a signal no more runs start, and those that are running end behind their step."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in list(running):
+            process.send_signal(signal.SIGINT)
+        print("stopped; the same command goes on, with `-- --restart` also within the runs", file=sys.stderr)
+        raise
 
 
 def run_all(out, everything, inputs, jobs):
     """Runs commands in their folders, except those that are complete; returns the errors by folder."""
     open_runs = [of for of in everything if not is_complete(*of, inputs)]
     done, failed, jobs = len(everything) - len(open_runs), {}, max(1, min(jobs, len(open_runs)))
+    running = set()
     print(f"{len(everything)} runs, {done} of them complete", flush=True)
     out.mkdir(parents=True, exist_ok=True)
 
     def attempt(of):
         with claim(locks, of[0]) as is_free:
-            return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], jobs)
+            return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], jobs, running)
 
     with open(out / ".locks", "wb") as locks:
         while open_runs:
             later = {}
-            with ThreadPoolExecutor(jobs) as pool:
+            with ThreadPoolExecutor(jobs) as pool, stopping(pool, running):
                 for k, error in enumerate(pool.map(attempt, open_runs)):
                     # Another study has it, or the memory may suffice for it alone, after the others.
                     if error is None or jobs > 1 and "not enough memory" in error:

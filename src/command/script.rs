@@ -3,11 +3,8 @@
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
 use std::{
-    collections::BTreeMap,
-    env,
-    ffi::OsString,
-    io::Write,
-    process::{Command, Stdio},
+    collections::BTreeMap, env, ffi::OsString, io::Seek, os::unix::process::CommandExt,
+    process::Command,
 };
 
 /// Names and sources of files in scripts/.
@@ -41,30 +38,25 @@ pub struct ScriptArguments {
     arguments: Vec<OsString>,
 }
 
-/// Runs the script `name`. The script itself reports problems of its input.
+/// Runs the script `name`, and returns only if it cannot start. The script itself reports problems of its input.
 pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Result<(), Failure> {
     require_one_process()?;
     let python = python()?;
-    let mut running = Command::new(&python)
+    let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
+    let mut sources = tempfile::tempfile().map_err(Failure::from)?;
+    serde_json::to_writer(&sources, &all).map_err(Failure::from)?;
+    sources.rewind().map_err(Failure::from)?;
+    // Python takes the place of this process, and gets its signals.
+    let error = Command::new(&python)
         .args(["-c", EMBEDDED, name])
         .args(arguments)
         // `compare` runs this program.
         .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
         // The sources and their output are UTF-8.
         .env("PYTHONIOENCODING", "utf-8")
-        .stdin(Stdio::piped())
-        .spawn()
-        .map_err(|error| format!("{}: {error}", python.display()))?;
-    if let Some(mut input) = running.stdin.take() {
-        let sources: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
-        let sources = serde_json::to_vec(&sources).map_err(Failure::from)?;
-        // A script that ends early reports the reason itself.
-        let _ = input.write_all(&sources);
-    }
-    match running.wait().map_err(Failure::from)?.code() {
-        Some(0) => Ok(()),
-        code => Err(Failure { code: code.map_or(1, |code| code as u8), message: None }),
-    }
+        .stdin(sources)
+        .exec();
+    Err(Failure::from(format!("{}: {error}", python.display())))
 }
 
 /// The Python of the variable `PYTHON`; without it, the first usual one that has the packages of the scripts.
