@@ -101,9 +101,9 @@ def arguments_of(prog):
         parser.error("--line and --along: give one of them")
     if (arguments.times or arguments.quantity) and not (arguments.line or arguments.along):
         parser.error("--times and --quantity are for curves: give --line or --along, too; --time is for pictures")
-    for name in ("factor", "width"):
-        if getattr(arguments, name) is not None and not 0.0 < getattr(arguments, name) < inf:
-            parser.error(f"--{name}: must be positive")
+    for name, most in (("factor", inf), ("width", 100.0)):
+        if getattr(arguments, name) is not None and not 0.0 < getattr(arguments, name) < most:
+            parser.error(f"--{name}: must be positive" + (f", below {most:g} inches" if most < inf else ""))
     if arguments.range and not 0.0 <= arguments.range[0] < arguments.range[1] < inf:
         parser.error("--range: needs 0 <= A < B")
     if arguments.time is not None and not isfinite(arguments.time):

@@ -2,7 +2,7 @@
 
 use crate::support::{difference, problem, run, try_run};
 use signorini::{
-    contact::{REGISTRY, SOLVERS, find},
+    contact::{ContactOptions, SOLVERS, solvers},
     evolution::DiscreteProblem,
     mesh::Mesh,
 };
@@ -45,10 +45,13 @@ fn a_type_of_tao_that_is_asked_for_is_not_rescued() {
 }
 
 #[test]
-fn a_rescuer_is_another_solver() {
-    for entry in REGISTRY {
-        let Some(name) = entry.rescuer else { continue };
-        let (rescuer, _) = find(name).unwrap();
-        assert!(rescuer.name != entry.name, "{}", entry.name);
-    }
+fn a_rescuer_that_stops_short_is_rescued_too_and_none_tries_twice() {
+    let rescuers = |name| -> Vec<_> {
+        let (_, rescuers) = solvers(name, true, &ContactOptions::default()).unwrap();
+        rescuers.iter().map(|solver| solver.name().to_owned()).collect()
+    };
+    assert_eq!(rescuers("active-set"), ["tao"]);
+    assert_eq!(rescuers("penalty-duality"), ["active-set", "tao"]);
+    assert_eq!(rescuers("tao"), ["active-set"]);
+    assert!(rescuers("tao:blmvm").is_empty() && rescuers("penalty-duality:plain").is_empty());
 }
