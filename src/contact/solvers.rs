@@ -240,9 +240,9 @@ fn names() -> Vec<String> {
     REGISTRY.iter().flat_map(of).collect()
 }
 
-/// The solver `name`, and the solvers that replace it if it stops above the tolerance: its rescuer, and then the rescuer's.
-/// A variant has no replacement, so that its own result is seen, and `rescue = false` forbids one. Without bounds every
-/// name means one linear solve, by the active set method.
+/// The solver `name`, and the solver that replaces it if it stops above the tolerance. A variant has no
+/// replacement, so that its own result is seen, and `rescue = false` forbids one. Without bounds every name
+/// means one linear solve, by the active set method.
 ///
 /// # Errors
 /// There is none of that name.
@@ -250,19 +250,13 @@ pub fn solvers(
     name: &str,
     bounded: bool,
     options: &ContactOptions,
-) -> Result<(BoxedSolver, Vec<BoxedSolver>), SolverError> {
+) -> Result<(BoxedSolver, Option<BoxedSolver>), SolverError> {
     let (entry, variant) = find(name)?;
     if !bounded {
-        return Ok((Box::new(ActiveSet { name: "linear" }), Vec::new()));
+        return Ok((Box::new(ActiveSet { name: "linear" }), None));
     }
-    let (mut rescuers, mut last) = (Vec::new(), entry);
-    while let Some(next) = last.rescuer.filter(|next| *next != entry.name)
-        && options.rescue
-        && variant.is_empty()
-        && rescuers.len() + 1 < REGISTRY.len()
-    {
-        (last, _) = find(next)?;
-        rescuers.push((last.construct)("", options));
-    }
-    Ok(((entry.construct)(variant, options), rescuers))
+    let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
+    let rescuer = rescuer.map(find).transpose()?;
+    let construct = |entry: &SolverEntry, variant| (entry.construct)(variant, options);
+    Ok((construct(entry, variant), rescuer.map(|(entry, variant)| construct(entry, variant))))
 }

@@ -10,7 +10,7 @@
 //!   the step and its reason.
 //! - Callers: the loop over the steps in `evolution`, which then accepts the step or tries a shorter one.
 //!
-//! The way of one step: [`ContactStep::solve`] lets the chosen solver try, then perhaps its rescuers (`rescue`). A try
+//! The way of one step: [`ContactStep::solve`] lets the chosen solver try, then perhaps the rescuer (`rescue`). A try
 //! starts from the extrapolated accepted steps (`start`), solves (`minimisation`), has the answer certified
 //! (`certificate`), and repeats from a moved reference or to a smaller tolerance where rounding is the reason
 //! (`attempts`). Of many answers it returns the one of least displacement (`one_of_many`).
@@ -49,9 +49,9 @@ pub struct ContactStep<'a> {
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
     solver: BoxedSolver,
-    /// The solvers for steps in which `solver` stops short of the tolerance, one after the other.
-    rescuers: Vec<BoxedSolver>,
-    /// Solves the linear systems of all solvers.
+    /// The solver for steps in which `solver` stops short of the tolerance.
+    rescuer: Option<BoxedSolver>,
+    /// Solves the linear systems of both solvers.
     elastic: LinearSolver,
     stiffness: Stiffness,
     /// η_*(ζ) at the quadrature points, with which K was assembled.
@@ -115,7 +115,7 @@ impl<'a> ContactStep<'a> {
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
-        let (solver, rescuers) = contact::solvers(solver, bounded, options)?;
+        let (solver, rescuer) = contact::solvers(solver, bounded, options)?;
         // A preconditioner needs only single precision, which halves the bytes to read.
         let precision = Precision::Preconditioner;
         let memory = AcceptedState {
@@ -129,7 +129,7 @@ impl<'a> ContactStep<'a> {
             problem,
             phases,
             solver,
-            rescuers,
+            rescuer,
             elastic: LinearSolver::new(session, contact::ELASTIC, unknowns, precision)?,
             stiffness,
             zeta_at_points: body.at_points(&vec![1.0; body.mesh.nodes.len()]),

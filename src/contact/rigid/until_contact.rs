@@ -28,7 +28,8 @@ pub(crate) fn unconstrained_motions(
 /// start at the bounds, `rigid` has u·ν of the motions there, a column each, and `work` the load's work on
 /// them. Returns the amplitude of each motion, m. Collective.
 ///
-/// If the load drives none of the remaining motions, the body stays; with `undriven` it takes any of them.
+/// If the load drives none of the remaining motions, the body stays. With `undriven` it takes one of them. Rounding may
+/// then decide its direction, so the body turns back if no bound lies ahead.
 pub(crate) fn rigid_motion_until_contact(
     comm: Communicator,
     (rigid, work): (&DMatrix<f64>, &DVector<f64>),
@@ -47,26 +48,29 @@ pub(crate) fn rigid_motion_until_contact(
             false if undriven => any.normalize(),
             false => return amplitudes,
         };
-        let (speed, gone) = (rigid * &motion, rigid * &amplitudes);
-        let fastest = comm.max(speed.amax());
-        let distance = |i: usize| {
-            let bound = &bounds[i];
-            let value = if speed[i] > 0.0 { bound.upper } else { bound.lower };
-            (i, (value - c[i] - gone[i]) / speed[i])
-        };
-        let moving = |i: &usize| active[*i] == 0.0 && speed[*i].abs() > 1e-6 * fastest;
-        let nearest = (0..bounds.len())
-            .filter(moving)
-            .map(distance)
-            .filter(|(_, distance)| distance.is_finite())
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let (distance, rank) = comm.min_with_rank(nearest.map_or(f64::INFINITY, |(_, d)| d));
-        if distance == f64::INFINITY {
-            return amplitudes;
-        }
-        amplitudes += distance * motion;
-        if let Some((i, _)) = nearest.filter(|_| rank == comm.rank()) {
-            active[i] = speed[i].signum();
+        let gone = rigid * &amplitudes;
+        let ways = [motion.clone(), -motion];
+        let stopped = ways.into_iter().take(1 + usize::from(undriven)).find_map(|motion| {
+            let speed = rigid * &motion;
+            let fastest = comm.max(speed.amax());
+            let distance = |i: usize| {
+                let value = if speed[i] > 0.0 { bounds[i].upper } else { bounds[i].lower };
+                (i, (value - c[i] - gone[i]) / speed[i])
+            };
+            let moving = |i: &usize| active[*i] == 0.0 && speed[*i].abs() > 1e-6 * fastest;
+            let nearest = (0..bounds.len())
+                .filter(moving)
+                .map(distance)
+                .filter(|(_, distance)| distance.is_finite())
+                .min_by(|a, b| a.1.total_cmp(&b.1));
+            let (distance, rank) = comm.min_with_rank(nearest.map_or(f64::INFINITY, |(_, d)| d));
+            let own = nearest.filter(|_| rank == comm.rank()).map(|(i, _)| (i, speed[i].signum()));
+            (distance < f64::INFINITY).then_some((distance * motion, own))
+        });
+        let Some((step, own)) = stopped else { return amplitudes };
+        amplitudes += step;
+        if let Some((i, side)) = own {
+            active[i] = side;
         }
     }
 }
