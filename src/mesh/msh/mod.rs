@@ -4,7 +4,9 @@
 mod body;
 mod byte_reader;
 mod contents;
+mod flat;
 mod one_body;
+mod slit;
 mod v4;
 mod write;
 
