@@ -21,7 +21,7 @@ mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes, joined_faces};
 pub use error::MeshError;
-pub use gmsh::{file, is_self_contained, load, load_graded, mesh_geo, scaling_factor};
+pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
 pub use msh::{parse, read};
 pub use quadratic::Kink;
 pub use refine::Refinement;
