@@ -32,7 +32,7 @@ enum Command {
         name: PathBuf,
     },
     /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
-    /// `mesh`, it meshes a .geo whose .msh is missing or older.
+    /// `mesh`, it meshes a .geo unless this was done before.
     Check(command::SceneArguments),
     /// Describe a folder of results: scene, program, outcome, errors, frames.
     Info(command::ScriptArguments),
@@ -60,7 +60,7 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
-    /// Mesh the .geo files of scenes with gmsh, if their .msh is missing or older.
+    /// Mesh the .geo files of scenes with gmsh, unless this was done before.
     Mesh {
         /// Scene files.
         #[arg(required = true, value_name = "SCENE")]

@@ -291,6 +291,7 @@ pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
     for path in scenes {
         let scene = Scene::read(path, &[]).map_err(Failure::input)?;
         let mesh = read_mesh(&scene, false)?;
+        mesh.notes.iter().for_each(|note| tell("note", note));
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
         say(&format!("{}: {nodes} nodes, {triangles} triangles", scene.name));
     }

@@ -21,7 +21,7 @@ mod refine;
 
 pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes, joined_faces};
 pub use error::MeshError;
-pub use gmsh::{file, is_self_contained, load, load_graded, mesh_geo, scaling_factor};
+pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
 pub use msh::{parse, read};
 pub use quadratic::Kink;
 pub use refine::Refinement;
@@ -60,6 +60,8 @@ pub struct Mesh {
     pub curved: BTreeMap<[usize; 2], [f64; 2]>,
     /// The version of gmsh that made the mesh, if this program ran gmsh.
     pub gmsh: Option<String>,
+    /// Notes for the user on its file: what was left out, what looks like a mistake.
+    pub notes: Vec<String>,
 }
 
 /// One physical curve: the edges of the triangulation that lie on it.
@@ -87,9 +89,7 @@ impl Mesh {
 
     /// The edges of the boundary (those of a single triangle), the body on their left.
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
-        let sides = sides(&self.triangles);
-        let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
-        single.map(|sides| sides[0].directed()).collect()
+        boundary_edges(&sides(&self.triangles))
     }
 
     /// The sizes of the triangles at the nodes of a mesh, m, that has `wanted` ones at some of these: elsewhere the mean length
@@ -164,6 +164,12 @@ fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let mut sides: Vec<Side> = triangles.iter().enumerate().flat_map(of_triangle).collect();
     sides.sort_unstable();
     sides
+}
+
+/// The edges with a single one of the `sides`, which are sorted; the body on their left.
+fn boundary_edges(sides: &[Side]) -> Vec<[usize; 2]> {
+    let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
+    single.map(|sides| sides[0].directed()).collect()
 }
 
 /// An edge by its ends in increasing order.

@@ -36,6 +36,7 @@ impl Mesh {
             surfaces,
             curved: self.curved.iter().map(|(&ends, &at)| (sorted(edge(ends)), at)).collect(),
             gmsh: self.gmsh,
+            notes: self.notes,
         }
     }
 }

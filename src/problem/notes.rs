@@ -30,7 +30,8 @@ impl DiscreteProblem {
         let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
         let locks = linear && scene.material.plane == Plane::Strain && poisson > LOCKING;
         let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
-        let mut notes = Vec::from_iter(scene.time.and_then(|grid| grid.note()));
+        let mut notes = self.mesh().notes.clone();
+        notes.extend(scene.time.and_then(|grid| grid.note()));
         notes.extend(self.motions.free.iter().map(|motion| {
             format!("nothing prevents or drives {motion}: the answer given is the one with the least ∫|u|²")
         }));

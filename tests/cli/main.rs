@@ -11,6 +11,7 @@ mod failing;
 mod fields;
 mod figures;
 mod losses;
+mod kept;
 mod keys;
 mod meshes;
 mod provenance;

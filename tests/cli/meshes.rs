@@ -1,10 +1,6 @@
 //! `signorini mesh`, and scenes that name a `.geo`.
 
 use crate::test_directory::{SCENE, TestDirectory};
-use std::{
-    fs,
-    time::{Duration, SystemTime},
-};
 
 pub const GEO: &str = r#"
 DefineConstant[ size = 0.5 ];
@@ -34,28 +30,9 @@ fn meshes_appear_beside_their_geo() {
     let lines: Vec<&str> = said.out.lines().collect();
     assert!(lines[0].starts_with("scene: ") && lines[0].contains(" nodes, "), "{lines:?}");
     assert!(lines[1].starts_with("fine: "), "{lines:?}");
-    let files = ["fine.toml", "scene.toml", "square-size0.25.msh", "square.geo", "square.msh"];
+    let files = ["fine.toml", "scene.toml", "square-size=0.25.msh", "square.geo", "square.msh"];
     assert_eq!(test_directory.names("geo"), files);
     assert!(!test_directory.path("out").exists());
-}
-
-#[test]
-fn a_change_in_an_included_file_is_meshed() {
-    let test_directory = test_directory();
-    test_directory.write("geo/square.geo", "Include \"parts/square.geo\";\n");
-    test_directory.write("geo/parts/square.geo", "Include \"body.geo\";\n");
-    test_directory.write("geo/parts/body.geo", GEO);
-    let meshed = || {
-        assert_eq!(test_directory.say(&["mesh", "geo/scene.toml"]).code, Some(0));
-        test_directory.read("geo/square.msh")
-    };
-    let coarse = meshed();
-    let body = test_directory.path("geo/parts/body.geo");
-    test_directory.write("geo/parts/body.geo", &GEO.replace("size = 0.5", "size = 0.25"));
-    // Clocks of file systems are coarse: that it is older or newer must not hang on them.
-    let later = SystemTime::now() + Duration::from_secs(10);
-    fs::File::options().append(true).open(body).unwrap().set_modified(later).unwrap();
-    assert!(meshed().len() > coarse.len());
 }
 
 #[test]

@@ -5,12 +5,15 @@ use std::{
     f64::consts::PI,
     fs,
     path::{Path, PathBuf},
-    time::{Duration, SystemTime},
+    thread,
 };
 
 use crate::boundary_nodes;
 use crate::common::{check_laws, close, curve_length, edges, parameters, smallest_angle};
-use signorini::mesh::{Mesh, MeshError, Order, load, mesh_geo};
+use signorini::{
+    mesh::{Mesh, MeshError, Order, extent, load},
+    scene::{MeshSource, Scene},
+};
 use tempfile::TempDir;
 
 /// A copy of one of the geometries in a folder of its own: meshes appear beside them.
@@ -227,25 +230,53 @@ fn second_order_adds_midpoints_and_changes_nothing_else() {
 }
 
 #[test]
-fn meshes_are_named_kept_and_renewed() {
+fn meshes_are_named() {
     let (folder, geo) = copy("square");
-    let name = |path: PathBuf| path.file_name().unwrap().to_str().unwrap().to_owned();
-    assert_eq!(name(mesh_geo(&geo, &BTreeMap::new(), Order::Linear).unwrap()), "square.msh");
     let sized = parameters([("size", 0.25), ("grading", 3.0)]);
-    let path = mesh_geo(&geo, &sized, Order::Linear).unwrap();
-    assert_eq!(name(path.clone()), "square-grading3-size0.25.msh");
-    assert_eq!(
-        load(&path, &BTreeMap::new(), Order::Linear).unwrap(),
-        load(&geo, &sized, Order::Linear).unwrap()
-    );
-
-    fs::write(&path, "kept").unwrap();
-    mesh_geo(&geo, &sized, Order::Linear).unwrap();
-    assert_eq!(fs::read_to_string(&path).unwrap(), "kept");
-    let later = SystemTime::now() + Duration::from_secs(10);
-    fs::File::options().append(true).open(&geo).unwrap().set_modified(later).unwrap();
-    assert_eq!(load(&geo, &sized, Order::Linear).unwrap().nodes.len(), 25);
+    for (parameters, name) in
+        [(BTreeMap::new(), "square.msh"), (sized, "square-grading=3-size=0.25.msh")]
+    {
+        let meshed = load(&geo, &parameters, Order::Linear).unwrap();
+        let path = folder.path().join(name);
+        assert_eq!(load(&path, &BTreeMap::new(), Order::Linear).unwrap(), meshed);
+        assert_eq!(load(&geo, &parameters, Order::Linear).unwrap(), meshed);
+    }
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 3, "something was left behind");
+}
+
+/// The meshes of the shipped scenes at twelve sizes, in elements of the first and of the second order by turns.
+#[test]
+fn every_scene_has_a_mesh_at_every_size() {
+    const SIZES: [f64; 12] = [4., 6., 8., 11., 16., 20., 25., 32., 40., 50., 64., 80.];
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let scenes = files.filter(|path| path.extension().is_some_and(|kind| kind == "toml"));
+    let mut bodies: Vec<_> = scenes
+        .map(|path| Scene::read(&path, &[]).unwrap().mesh)
+        .map(|MeshSource { file, mut parameters }| {
+            parameters.remove("size");
+            (file.file_stem().unwrap().to_str().unwrap().to_owned(), parameters)
+        })
+        .collect();
+    bodies.sort_by_key(|body| format!("{body:?}"));
+    bodies.dedup();
+    assert!(bodies.len() > 6);
+    let check = |(name, parameters): &(String, BTreeMap<String, f64>)| {
+        let (_folder, geo) = copy(name);
+        let size = extent(&load(&geo, parameters, Order::Linear).unwrap().nodes);
+        for (cells, order) in SIZES.iter().zip([Order::Linear, Order::Quadratic].iter().cycle()) {
+            let mut parameters = parameters.clone();
+            parameters.insert("size".to_owned(), size / cells);
+            let mesh = load(&geo, &parameters, *order);
+            let mesh = mesh.unwrap_or_else(|error| panic!("{parameters:?} {order:?}: {error}"));
+            assert!(mesh.notes.is_empty(), "{name}: {:?}", mesh.notes);
+        }
+    };
+    thread::scope(|scope| {
+        let (some, others) = bodies.split_at(bodies.len() / 2);
+        scope.spawn(|| others.iter().for_each(check));
+        some.iter().for_each(check);
+    });
 }
 
 #[test]
@@ -267,8 +298,10 @@ fn what_gmsh_rejects_is_told() {
     let message = fails(&[]);
     assert!(message.contains("gmsh could not mesh it") && message.contains("line 2"), "{message}");
     fs::write(&geo, "Point(1) = {0, 0, 0};\n").unwrap();
-    assert!(fails(&[]).contains("square.msh"), "an empty mesh is the reader's to refuse");
-    fs::remove_file(geo.with_extension("msh")).unwrap();
+    assert!(
+        fails(&[]).contains("there are no triangles"),
+        "an empty mesh is the reader's to refuse"
+    );
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "something was left behind");
 
     let none = load(&folder.path().join("none.geo"), &BTreeMap::new(), Order::Linear).unwrap_err();

@@ -17,6 +17,7 @@ fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
     signorini::mesh::boundary_nodes(faces)
 }
 
+mod blemishes;
 mod boundary;
 mod geometries;
 mod malformed;

@@ -45,6 +45,7 @@ fn sorted(mesh: Mesh) -> Mesh {
         curved: mesh.curved.iter().map(midpoint).collect(),
         triangles,
         gmsh: mesh.gmsh,
+        notes: mesh.notes,
     }
 }
 

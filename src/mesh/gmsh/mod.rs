@@ -1,36 +1,50 @@
 //! Meshes `.geo` files with the gmsh command line.
 
+mod kept;
 mod process;
 
+use process::note;
 pub(super) use process::run;
 
-use super::{Mesh, MeshError, Order, parse, read};
-use crate::whole_file;
-use std::{
-    collections::BTreeMap,
-    ffi::OsString,
-    fs, io,
-    path::{Path, PathBuf},
-    time::SystemTime,
+use super::{
+    Mesh, MeshError, Order,
+    msh::{parse, parse_made, read},
 };
+use crate::whole_file;
+use kept::Inputs;
+use std::{collections::BTreeMap, ffi::OsString, fs, io, path::Path};
 
-/// Reads the mesh from [`file()`] and sorts its nodes and triangles ([`Mesh::in_morton_order`]).
+/// Reads a `.msh`, or meshes a `.geo` with gmsh unless this was done before, and sorts nodes and triangles
+/// ([`Mesh::in_morton_order`]). `parameters` and `order` apply to a `.geo` only.
+///
+/// The mesh of a `.geo` is kept beside it. Its name lists the parameters and order 2, as in
+/// `bridge-grading=3-size=0.25.msh` and `hertz.order2.msh`. It is read again if gmsh would make it from the same
+/// files, parameters and order, in the same version.
+///
+/// Each parameter overrides the `DefineConstant` of its name. `size`, in m, also bounds the length of the edges.
 ///
 /// # Errors
-/// Those of [`file()`] and [`read`].
+/// Those of [`read`], and any other extension; a `.geo` cannot be read, a parameter makes no sense or occurs
+/// nowhere in the `.geo`, gmsh is missing, or gmsh reports an error.
 pub fn load(
     path: &Path,
     parameters: &BTreeMap<String, f64>,
     order: Order,
 ) -> Result<Mesh, MeshError> {
-    read(&file(path, parameters, order)?).map(Mesh::in_morton_order)
+    let extension = path.extension().map(|e| e.to_ascii_lowercase());
+    let mesh = match extension.as_ref().and_then(|e| e.to_str()) {
+        Some("msh") => read(path),
+        Some("geo") => mesh_geo(path, parameters, order),
+        _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
+    };
+    mesh.map(Mesh::in_morton_order)
 }
 
 /// Meshes a `.geo` file with edges about as long as `sizes`, m, which belong to the nodes of another mesh of this file. The
 /// mesh is not kept.
 ///
 /// # Errors
-/// Those of [`mesh_geo`] and [`read`].
+/// Those of [`load`] for a `.geo`.
 pub fn load_graded(
     geo: &Path,
     parameters: &BTreeMap<String, f64>,
@@ -54,44 +68,15 @@ pub fn load_graded(
          Background Field = sizes;\n",
     );
     let bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
-    parse(&bytes, geo).map(Mesh::in_morton_order)
+    parse_made(&bytes, geo).map(Mesh::in_morton_order)
 }
 
-/// The path of a `.msh`: that of the given file, or of the file that [`mesh_geo`] makes from a `.geo`.
-///
-/// `parameters` and `order` apply to a `.geo` only.
-///
-/// # Errors
-/// Those of [`mesh_geo`], and any other extension.
-pub fn file(
-    path: &Path,
-    parameters: &BTreeMap<String, f64>,
-    order: Order,
-) -> Result<PathBuf, MeshError> {
-    let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("msh") => Ok(path.to_owned()),
-        Some("geo") => mesh_geo(path, parameters, order),
-        _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
-    }
-}
-
-/// Meshes a `.geo` file and returns the path of the `.msh` beside it.
-///
-/// Each parameter overrides the `DefineConstant` of its name. The name of the mesh lists the parameters and
-/// order 2, as in `bridge-grading3-size0.25.msh` and `hertz.order2.msh`. `size`, in m, also bounds the length
-/// of the edges. A mesh is made again only if it is older than its `.geo` or the files that this includes
-/// with `Include` or `Merge`. A new mesh file appears complete or not at all.
-///
-/// # Errors
-/// The `.geo` cannot be read or the `.msh` written, a parameter makes no sense or occurs
-/// nowhere in the `.geo`, gmsh is missing, or gmsh reports an error.
-pub fn mesh_geo(
+/// The mesh of a `.geo` file, kept beside it.
+fn mesh_geo(
     geo: &Path,
     parameters: &BTreeMap<String, f64>,
     order: Order,
-) -> Result<PathBuf, MeshError> {
-    let started = SystemTime::now();
+) -> Result<Mesh, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
     // gmsh 4.8 drops the others silently.
     if !text.ends_with('\n')
@@ -107,23 +92,39 @@ pub fn mesh_geo(
             let problem = format!("mesh parameter `{parameter}` = {value}: {reason}");
             return Err(MeshError::file(geo, problem));
         }
-        name.push(format!("-{parameter}{value}"));
+        name.push(format!("-{parameter}={value}"));
     }
     // No parameter makes such a name, as names of parameters have no point.
     name.push(if order == Order::Quadratic { ".order2.msh" } else { ".msh" });
-    let mesh = geo.with_file_name(name);
-    let last_change = last_change(geo).map_err(MeshError::io(geo))?;
-    if modified(&mesh).is_ok_and(|meshed| meshed >= last_change) {
-        return Ok(mesh);
+    let path = geo.with_file_name(name);
+
+    let (arguments, last) = (arguments(parameters), last_words(&text, parameters, order));
+    let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
+    let digest = inputs.digest(&arguments, &last);
+    let kept = fs::read(&path);
+    let made_from = kept.as_ref().ok().and_then(|file| kept::inputs_of(file));
+    if let Ok(file) = &kept
+        && made_from == Some(&digest)
+        && inputs.are_all
+    {
+        let mesh = parse(file, &path)?;
+        if kept::installed().is_none_or(|version| mesh.gmsh.as_deref() == Some(version)) {
+            return Ok(mesh);
+        }
     }
-    let last = last_words(&text, parameters, order);
-    let bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
-    // A later change of the .geo is newer.
-    whole_file::write(&mesh, &bytes, |file| file.set_modified(started)).map_err(|error| {
-        let problem =
-            format!("cannot be written: {error}; copy the .geo into a folder where you may write");
-        MeshError::file(&mesh, problem)
-    })?;
+    let bytes = run((geo, None), arguments, &last, "mesh it")?;
+    let mesh = parse_made(&bytes, geo)?;
+    let is_free = fs::symlink_metadata(&path).is_err();
+    if is_free || made_from.is_some() {
+        let signed = [&bytes, kept::signature(&bytes, &digest).as_bytes()].concat();
+        if let Err(error) = whole_file::write(&path, &signed, |_| Ok(())) {
+            note(&path, &format!("it cannot be written ({error}), so that every run meshes anew"));
+        }
+    } else {
+        let problem = "it is not as this program wrote it, so that it is neither used nor replaced and every run \
+                       meshes anew; rename it, or name it as mesh.file to use it";
+        note(&path, problem);
+    }
     Ok(mesh)
 }
 
@@ -167,36 +168,9 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     }
 }
 
-/// Whether no command of a `.geo` reads another file.
+/// Whether a `.geo` reads no other file.
 pub fn is_self_contained(geo: &Path) -> bool {
-    let commands = ["Include", "Merge", "ShapeFromFile"];
-    read_text(geo).is_ok_and(|text| !commands.iter().any(|command| text.contains(command)))
-}
-
-/// The time of the last change of the `.geo` and of all files that it includes (`Include "name"`, `Merge
-/// "name"`), directly or through others. gmsh reports missing files.
-fn last_change(geo: &Path) -> io::Result<SystemTime> {
-    let mut files = vec![fs::canonicalize(geo)?];
-    let mut last = SystemTime::UNIX_EPOCH;
-    let mut next = 0;
-    while let Some(file) = files.get(next).cloned() {
-        next += 1;
-        last = last.max(modified(&file)?);
-        let text = read_text(&file)?;
-        let commands = ["Include", "Merge"].into_iter().flat_map(|word| text.split(word).skip(1));
-        let quoted = commands.filter_map(|rest| rest.trim_start().strip_prefix('"'));
-        for name in quoted.filter_map(|rest| rest.split('"').next()) {
-            // Names are relative to the file that contains them.
-            let path = fs::canonicalize(file.with_file_name(name)).ok();
-            let new = path.filter(|path| path.is_file() && !files.contains(path));
-            files.extend(new);
-        }
-    }
-    Ok(last)
-}
-
-fn modified(path: &Path) -> io::Result<SystemTime> {
-    fs::metadata(path).and_then(|data| data.modified())
+    Inputs::read(geo).is_ok_and(|inputs| inputs.are_one_file())
 }
 
 /// Whether the `.geo` file `text` sets the largest length of an edge from the parameter `size`.

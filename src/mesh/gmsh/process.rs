@@ -1,14 +1,14 @@
 //! Runs the gmsh command line.
 
 use crate::interrupt::{Interrupts, received};
-use crate::mesh::MeshError;
+use crate::mesh::{MeshError, msh::is_complete};
 use std::{
     collections::HashSet,
     env,
     ffi::OsString,
     fs::{self, File},
     io::{self, Write},
-    path::Path,
+    path::{Path, PathBuf},
     process::{Child, Command, ExitStatus, Stdio},
     thread::sleep,
     time::{Duration, Instant},
@@ -33,7 +33,7 @@ const VERSION: &str =
 /// the contents of `input`. `task` completes "gmsh could not …" in messages.
 ///
 /// # Errors
-/// gmsh is missing, takes too long or reports an error, or a signal came.
+/// gmsh is missing, takes too long, reports an error or makes an incomplete file, or a signal came.
 pub fn run(
     (input, bytes): (&Path, Option<&[u8]>),
     arguments: impl IntoIterator<Item = OsString>,
@@ -79,14 +79,29 @@ pub fn run(
     // gmsh can report errors and still exit with success.
     let is_error = |line: &str| line.trim_start().starts_with("Error");
     if status.success() && made.exists() && !said.lines().any(is_error) {
-        let [mesh, version] =
-            [made, version].map(|file| fs::read(&file).map_err(MeshError::io(&file)));
-        return Ok([&mesh?, &b"$Comments\n"[..], &version?, b"$EndComments\n"].concat());
+        let read = |file: PathBuf| fs::read(&file).map_err(MeshError::io(&file));
+        let (mesh, version) = (read(made)?, read(version)?);
+        // gmsh does not report a full disk.
+        if !is_complete(&mesh) {
+            let problem = format!(
+                "the file that gmsh made in {} was cut off: the disk may be full; free some space, or set the \
+                 environment variable TMPDIR to another folder",
+                env::temp_dir().display()
+            );
+            return Err(MeshError::file(input, problem));
+        }
+        return Ok([&mesh, &b"$Comments\n"[..], &version, b"$EndComments\n"].concat());
     }
     let mut seen = HashSet::new();
     let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
     let message = if lines.is_empty() { format!("no message, {status}") } else { lines.join("\n") };
     Err(MeshError::file(input, format!("gmsh could not {task}:\n{message}")))
+}
+
+/// Shows the user a note on a file at once.
+pub fn note(file: &Path, text: &str) {
+    // If stderr is closed, the work goes on.
+    let _ = io::stderr().write_all(format!("note: {}: {text}\n", file.display()).as_bytes());
 }
 
 /// Waits for gmsh. Ends it after the time limit or on a signal to this process.
@@ -100,10 +115,7 @@ fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshErr
             return Ok(status);
         }
         if !told && started.elapsed() > PATIENCE {
-            let note =
-                format!("note: {}: gmsh is at work; a larger size is quicker\n", input.display());
-            // If stderr is closed, gmsh still works.
-            let _ = io::stderr().write_all(note.as_bytes());
+            note(input, "gmsh is at work; a larger size is quicker");
             told = true;
         }
         let late = started.elapsed().as_secs_f64() > limit;

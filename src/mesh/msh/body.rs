@@ -1,22 +1,20 @@
 //! Makes the mesh of a plane body from the contents of a file.
 
 use super::{
-    super::{Curve, Mesh, Side, extent, sides, twice_area},
+    super::{Curve, Mesh, Side, boundary_edges, extent, place, sides, twice_area},
     byte_reader::{Result, error_at},
     contents::{Contents, Element, Node},
-    one_body,
+    flat, one_body, slit,
 };
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use std::collections::BTreeMap;
 
-/// Twice the area over the square of the longest side: below this value a triangle is flat.
-const FLAT: f64 = 1e-10;
-/// |z| over the extent of the body: below this value a node lies in the plane.
-const PLANAR: f64 = 1e-10;
+/// The largest difference of z over the extent of the body: ten times the tolerance of OpenCASCADE.
+const PLANAR: f64 = 1e-6;
 
 /// The mesh of the body. It has no nodes without triangles, such as the centres of arcs.
 pub fn mesh(contents: &Contents) -> Result<Mesh> {
-    let (elements, surfaces) = triangles(contents);
+    let (elements, mut surfaces) = triangles(contents);
     if elements.is_empty() {
         let none = "there are no triangles: with physical groups gmsh writes these alone, so name the body in the \
                     .geo, as in `Physical Surface(\"body\") = {1};` (and mesh with `gmsh -2`)";
@@ -24,10 +22,19 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
     }
     let (index, listed) = number_nodes(contents, &elements)?;
     let nodes: Vec<[f64; 2]> = listed.iter().map(|node| [node.point[0], node.point[1]]).collect();
-    let limit = PLANAR * extent(&nodes);
-    listed.iter().try_for_each(|node| check_planar(node, limit))?;
+    let plane = [listed[0].point[2], PLANAR * extent(&nodes)];
+    listed.iter().try_for_each(|node| check_planar(node, plane))?;
     let counter_clockwise = |element: &&Element<3>| counter_clockwise(element, &index, &nodes);
-    let triangles = elements.iter().map(counter_clockwise).collect::<Result<Vec<_>>>()?;
+    let mut triangles = elements.iter().map(counter_clockwise).collect::<Result<Vec<_>>>()?;
+    let removed = flat::mend(&nodes, &mut triangles, &mut surfaces).or_else(|flat| {
+        let problem = format!(
+            "triangle {} has no area at {}: its nodes lie on a line, or squares of its coordinates are \
+             beyond double precision; mend the mesh there, or try Mesh.Algorithm = 1 in the .geo",
+            elements[flat].tag,
+            place(extent(&nodes), nodes[triangles[flat][0]])
+        );
+        error_at(elements[flat].at, problem)
+    })?;
     let sides = sides(&triangles);
     let same_side =
         |pair: &&[Side]| (pair[0].edge, pair[0].on_left) == (pair[1].edge, pair[1].on_left);
@@ -35,29 +42,54 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
         let [first, second] = [0, 1].map(|i| elements[pair[i].triangle]);
         let [a, b] = pair[0].edge.map(|node| listed[node].tag);
         let problem = format!(
-            "triangles {} and {} lie on the same side of their common edge, nodes {a} and {b}: two \
+            "triangles {} and {} lie on the same side of their common edge, nodes {a} and {b} at {}: two \
              surfaces overlap, of which one should go (gmsh: Coherence), or the mesh folds over \
              itself",
-            first.tag, second.tag
+            first.tag,
+            second.tag,
+            place(extent(&nodes), nodes[pair[0].edge[0]])
         );
         return error_at(second.at, problem);
     }
     one_body::check(&nodes, &triangles, &sides)?;
     let curves = curves(contents, &index, &sides);
-    let mut mesh = Mesh { nodes, triangles, curves, surfaces, ..Mesh::default() };
+    let notes = [ungrouped(contents, extent(&nodes)), slit::note(&nodes, &boundary_edges(&sides))];
+    let notes = notes.into_iter().flatten().collect();
+    let mut mesh = Mesh { nodes, triangles, curves, surfaces, notes, ..Mesh::default() };
     if !contents.midpoints.is_empty() {
-        set_midpoints(&mut mesh, contents, &elements, &index, limit)?;
+        set_midpoints(&mut mesh, contents, &elements, &index, plane)?;
+        mesh.curved.retain(|edge, _| !removed.contains(edge));
     }
     Ok(mesh)
 }
 
-fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<()> {
-    match z.abs() > limit {
+/// Checks that a node lies in the plane of the body, up to a tolerance.
+fn check_planar(
+    &Node { tag, point: [.., z], at }: &Node,
+    [plane, tolerance]: [f64; 2],
+) -> Result<()> {
+    match (z - plane).abs() > tolerance {
         true => {
-            error_at(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0"))
+            let problem = format!(
+                "node {tag} has z = {z} instead of {plane}: the body must lie in a plane of constant z"
+            );
+            error_at(at, problem)
         }
         false => Ok(()),
     }
+}
+
+/// A note on the triangles in no physical surface, if there are physical surfaces, in a body of this extent, m.
+fn ungrouped(contents: &Contents, extent: f64) -> Option<String> {
+    let left_out: Vec<_> = contents.triangles.iter().filter(|t| t.group == 0).collect();
+    let first = left_out.first().filter(|_| left_out.len() < contents.triangles.len())?;
+    let node = contents.nodes.iter().find(|node| node.tag == first.nodes[0])?;
+    Some(format!(
+        "{} triangles are in no physical surface and left out, as at {}: name all parts of the body in the .geo, as in \
+         Physical Surface(\"body\") = {{1, 2}};",
+        left_out.len(),
+        place(extent, [node.point[0], node.point[1]])
+    ))
 }
 
 /// The triangles of the body, and by name those of each physical surface. If there are physical surfaces,
@@ -118,26 +150,10 @@ fn counter_clockwise(
     }
     let mut triangle = tags.map(|tag| index[&tag]);
     let [a, b, c] = triangle.map(|node| nodes[node]);
-    let twice = twice_area(a, b, c);
-    // The area of a triangle with huge coordinates overflows.
-    if twice.abs() <= flat([a, b, c]) || !twice.is_finite() {
-        let problem = format!(
-            "triangle {tag} has no area: its nodes lie on a line, or squares of its coordinates are \
-             beyond double precision; mend the mesh there, or try Mesh.Algorithm = 1 in the .geo"
-        );
-        return error_at(at, problem);
-    }
-    if twice < 0.0 {
+    if twice_area(a, b, c) < 0.0 {
         triangle.swap(1, 2);
     }
     Ok(triangle)
-}
-
-/// The largest twice the area (m²) of a flat triangle with these vertices.
-fn flat([a, b, c]: [[f64; 2]; 3]) -> f64 {
-    let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
-    let longest = length(a, b).max(length(b, c)).max(length(c, a));
-    FLAT * longest * longest
 }
 
 fn listed_twice<T>(node: &Node) -> Result<T> {
@@ -155,7 +171,7 @@ fn set_midpoints(
     contents: &Contents,
     elements: &[&Element<3>],
     index: &Index,
-    limit: f64,
+    plane: [f64; 2],
 ) -> Result<()> {
     let mut listed = HashMap::with_capacity_and_hasher(contents.nodes.len(), Default::default());
     for node in &contents.nodes {
@@ -172,12 +188,12 @@ fn set_midpoints(
                 );
             };
             let Some(node) = listed.get(midpoint) else { return missing_node(tag, *midpoint, at) };
-            check_planar(node, limit)?;
+            check_planar(node, plane)?;
             mesh.set_midpoint([index[&a], index[&b]], [node.point[0], node.point[1]]);
         }
     }
     for (element, &triangle) in elements.iter().zip(&mesh.triangles) {
-        let bound = flat(triangle.map(|node| mesh.nodes[node]));
+        let bound = flat::bound(triangle.map(|node| mesh.nodes[node]));
         if mesh.is_curved(triangle) && !mesh.jacobian_exceeds(bound, triangle) {
             let tag = element.tag;
             let problem = format!(

@@ -4,7 +4,9 @@
 mod body;
 mod byte_reader;
 mod contents;
+mod flat;
 mod one_body;
+mod slit;
 mod v4;
 mod write;
 
@@ -52,6 +54,20 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
         let place = at.map_or_else(String::new, |at| place(at, bytes, &sections));
         MeshError::File { path: path.to_owned(), place, problem }
     })
+}
+
+/// As [`parse`], from the bytes that gmsh has made of the file `path`.
+pub(super) fn parse_made(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> {
+    parse(bytes, path).map_err(|error| match error {
+        // The place in these bytes is no place in the file.
+        MeshError::File { path, problem, .. } => MeshError::file(&path, problem),
+        other => other,
+    })
+}
+
+/// Whether a file has sections, of which the last one is complete.
+pub(super) fn is_complete(bytes: &[u8]) -> bool {
+    sections_of(bytes).is_ok_and(|sections| !sections.is_empty())
 }
 
 /// The version of gmsh in a comment `gmsh 4.8.4`.

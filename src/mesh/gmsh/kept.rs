@@ -1,0 +1,100 @@
+//! The mesh of a `.geo`, kept in a file beside it for later runs.
+//!
+//! A kept file ends with a comment of two digests: of all inputs from which gmsh made the mesh, and of the
+//! file before this comment. A mesh is read again if the first digest is that of the present inputs. A file
+//! is replaced only if the second one is right: then this program wrote it, and nobody has changed it.
+
+use sha2::{Digest, Sha256};
+use std::{
+    env,
+    ffi::OsString,
+    fs, io,
+    iter::once,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::LazyLock,
+};
+
+/// Commands and options of a `.geo` that read the file of the name that follows in quotes. (An unquoted name
+/// is known to gmsh alone.)
+const READERS: [&str; 4] = ["Include", "Merge", "ShapeFromFile", "FileName"];
+/// Commands of a `.geo` whose result depends on more than files.
+const IMPURE: [&str; 2] = ["SystemCall", "GetEnv"];
+
+/// The files from which gmsh makes a mesh.
+pub struct Inputs {
+    /// The contents of the `.geo` and of all files that it names, directly or through others.
+    contents: Vec<Vec<u8>>,
+    /// Whether the mesh depends on these files alone.
+    pub are_all: bool,
+}
+
+impl Inputs {
+    /// Reads a `.geo` and each file whose name stands there in quotes. gmsh reports missing files.
+    pub fn read(geo: &Path) -> io::Result<Self> {
+        let mut files = vec![fs::canonicalize(geo)?];
+        let mut inputs = Self { contents: Vec::new(), are_all: true };
+        while let Some(file) = files.get(inputs.contents.len()).cloned() {
+            let bytes = fs::read(&file)?;
+            let text = String::from_utf8_lossy(&bytes);
+            // gmsh also runs the options beside a file.
+            let options = format!("{}.opt", file.display());
+            for name in text.split('"').chain(once(&*options)) {
+                // Most names are relative to the file that contains them, those of size fields to the working folder.
+                for path in [file.with_file_name(name), PathBuf::from(name)] {
+                    let path = fs::canonicalize(path).ok();
+                    files.extend(path.filter(|path| path.is_file() && !files.contains(path)));
+                }
+            }
+            let argument = |rest: &str| {
+                rest.trim_start_matches(|c: char| c.is_whitespace() || "(={".contains(c))
+                    .starts_with('"')
+            };
+            inputs.are_all &= !IMPURE.iter().any(|command| text.contains(command))
+                && READERS.iter().all(|reader| text.split(reader).skip(1).all(argument));
+            inputs.contents.push(bytes);
+        }
+        Ok(inputs)
+    }
+
+    /// Whether the `.geo` reads no other files.
+    pub fn are_one_file(&self) -> bool {
+        self.contents.len() == 1 && self.are_all
+    }
+
+    /// The digest of these files, of the options that the user has saved in gmsh, and of what else gmsh gets.
+    pub fn digest(&self, arguments: &[OsString], last: &str) -> String {
+        let options = env::home_dir().and_then(|home| fs::read(home.join(".gmsh-options")).ok());
+        let files: Vec<_> = self.contents.iter().chain(&options).map(|file| digest(file)).collect();
+        digest(format!("{files:?} {arguments:?} {last:?}").as_bytes())
+    }
+}
+
+fn digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The comment after a mesh from inputs of this digest.
+pub fn signature(mesh: &[u8], inputs: &str) -> String {
+    format!("$Comments\ninputs {inputs}, mesh {}\n$EndComments\n", digest(mesh))
+}
+
+/// The digest of the inputs of a kept mesh; `None` for any other file.
+pub fn inputs_of(file: &[u8]) -> Option<&str> {
+    let start = file.len().checked_sub(signature(b"", &digest(b"")).len())?;
+    let (mesh, end) = file.split_at(start);
+    let inputs = str::from_utf8(end).ok()?.strip_prefix("$Comments\ninputs ")?.split(',').next()?;
+    (signature(mesh, inputs).as_bytes() == end).then_some(inputs)
+}
+
+/// The version of the installed gmsh, if there is one.
+pub fn installed() -> Option<&'static str> {
+    static VERSION: LazyLock<Option<String>> = LazyLock::new(|| {
+        let said = Command::new("gmsh").arg("--version").output().ok()?;
+        // Some versions write it to stdout, others to stderr. A development version goes on with "-git".
+        let said = [said.stdout, said.stderr].concat();
+        let version = String::from_utf8_lossy(&said).trim().split('-').next()?.to_owned();
+        Some(version)
+    });
+    VERSION.as_deref()
+}
