@@ -160,20 +160,13 @@ impl Extremes {
         let stresses = nodal.stresses(&NodalStress::strained(problem, state), Some(vertices))?;
         let mut extremes = Self::new(problem, state, nodal, &stresses);
         extremes.of_points = extremes.named(&problem.singular_points());
-        for (names, extreme) in extremes.names().iter().zip(&mut extremes.of_points) {
-            if names.iter().any(|name| measured.grows.contains(name)) {
-                extreme.singular.get_or_insert_with(|| GROWS.to_owned());
+        for i in 0..extremes.of_points.len() {
+            let of = [i, extremes.part_of(i)];
+            if of.iter().any(|&k| measured.grows.contains(&extremes.of_points[k].name)) {
+                extremes.of_points[i].singular.get_or_insert_with(|| GROWS.to_owned());
             }
         }
         Ok(extremes)
-    }
-
-    /// The names of all extremes, each with that of the part in which it lies.
-    pub(super) fn names(&self) -> Vec<[String; 2]> {
-        let name = |k: usize| self.of_points[k].name.clone();
-        let of_points = (0..self.of_points.len()).map(|i| [name(i), name(self.part_of(i))]);
-        let lengths = self.contact_lengths.iter().map(|(name, _)| [name.clone(), name.clone()]);
-        of_points.chain(lengths).collect()
     }
 
     /// All values, in the order of [`DiscreteProblem::extremes`].

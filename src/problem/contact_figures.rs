@@ -56,7 +56,7 @@ impl DiscreteProblem {
             if row.pressure <= 0.0 || around.iter().any(|other| other.pressure > row.pressure) {
                 return None;
             }
-            let growth = young * self.kink(line, i, step) / TAU * LN_2;
+            let growth = young * self.kink(line, i, step).unwrap_or(0.0) / TAU * LN_2;
             let reason = match around.iter().all(|other| other.active == 1) {
                 true if around.is_empty() || growth <= SEEN * row.pressure => return None,
                 true => "a kink of the gap",
@@ -72,25 +72,22 @@ impl DiscreteProblem {
     }
 
     /// The change of the slope of the gap at the row `i` of a line, beyond twice the change at the second next vertices: a
-    /// smooth gap bends there as much, and a kink between two vertices does not reach them. 0 at the ends of the line.
-    fn kink(&self, line: &[ContactRow], i: usize, step: usize) -> f64 {
-        let boundary = self.scene().boundaries.iter().find(|of| of.name == line[i].boundary);
-        let Some(gap) = boundary.and_then(|boundary| boundary.gap()) else { return 0.0 };
-        let slope = |a: &ContactRow, b: &ContactRow| {
-            let [before, after] = [a, b].map(|row| gap.distance.eval(row.x, row.y, row.time));
-            (after - before) / (b.arc_length - a.arc_length)
+    /// smooth gap bends there as much, and a kink between two vertices does not reach them. `None` at the ends of the line.
+    fn kink(&self, line: &[ContactRow], i: usize, step: usize) -> Option<f64> {
+        let boundary = self.scene().boundaries.iter().find(|of| of.name == line[i].boundary)?;
+        let gap = &boundary.gap()?.distance;
+        let point =
+            |k: usize| line.get(k).map(|row| [row.arc_length, gap.eval(row.x, row.y, row.time)]);
+        // The change of the slope at a vertex, and the length of its edges, m.
+        let bend = |k: usize| {
+            let [[r, a], [s, b], [t, c]] =
+                [point(k.checked_sub(step)?)?, point(k)?, point(k + step)?];
+            Some([(c - b) / (t - s) - (b - a) / (s - r), t - r])
         };
-        // The curvature g″ at a row, and the length over which it is taken, m.
-        let curvature = |k: Option<usize>| {
-            let [a, b] = [k?.checked_sub(step)?, k? + step];
-            let (a, row, b) = (line.get(a)?, line.get(k?)?, line.get(b)?);
-            let length = 0.5 * (b.arc_length - a.arc_length);
-            Some(((slope(row, b) - slope(a, row)) / length, length))
-        };
-        let Some((own, length)) = curvature(Some(i)) else { return 0.0 };
-        let others = [i.checked_sub(2 * step), Some(i + 2 * step)].map(curvature);
-        let smooth = others.into_iter().flatten().fold(0.0, |most, (of, _)| f64::max(most, of));
-        (own - 2.0 * smooth) * length
+        let [own, length] = bend(i)?;
+        let others = [i.checked_sub(2 * step), Some(i + 2 * step)].into_iter().flatten();
+        let curvatures = others.filter_map(bend).map(|[bend, length]| bend / length);
+        Some(own - 2.0 * length * curvatures.reduce(f64::max)?.max(0.0))
     }
 }
 

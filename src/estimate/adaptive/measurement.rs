@@ -96,8 +96,8 @@ pub(super) struct Measurement {
     pub(super) depths: Vec<f64>,
     /// Per triangle: max |Δζ|; empty without damage.
     zeta: Vec<f64>,
-    /// The names of the extremes, each with that of the part in which it lies.
-    extremes: Vec<[String; 2]>,
+    /// The names of the extremes.
+    extremes: Vec<String>,
     /// The names of figures at points, or of probes, with these points, m.
     places: Vec<(String, [f64; 2])>,
 }
@@ -165,15 +165,15 @@ impl Measurement {
         let of_extremes = named.iter().map(|extreme| (extreme.name.clone(), extreme.at));
         // A material may have the name of a probe.
         self.places = of_extremes.chain(probes).collect();
-        self.extremes = extremes.names();
+        self.extremes = coarse.problem.extremes();
         let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
         let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
         self.grows = grows.map(|(extreme, _)| extreme.name.clone()).collect();
         self.bars = bars(coarse, fine, factor, &self.grows);
     }
 
-    /// The names of the extremes, each with that of the part in which it lies.
-    pub(super) fn extremes(&self) -> &[[String; 2]] {
+    /// The names of the extremes.
+    pub(super) fn extremes(&self) -> &[String] {
         &self.extremes
     }
 

@@ -40,15 +40,14 @@ impl<'a> Progress<'a> {
         self.estimates.push((triangles, error / self.accuracy));
     }
 
-    /// Adds a measurement of a round on `triangles`. Extremes whose errors stay grow as the mesh is refined; that of the
-    /// whole with the one of its part.
+    /// Adds a measurement of a round on `triangles`. Extremes whose errors stay grow as the mesh is refined.
     pub(super) fn measured(&mut self, triangles: usize, mut measured: Measurement) -> Measurement {
         self.most = self.most.max(4 * triangles);
         let errors = measured.errors(&[]).into_iter();
         let errors = errors.map(|error| (error.excess(self.accuracy), error.name));
         self.excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));
-        let stay = measured.extremes().iter().filter(|[_, part]| self.stays(part));
-        let stay: Vec<String> = stay.map(|[name, _]| name.clone()).collect();
+        let stay = measured.extremes().iter().filter(|name| self.stays(name));
+        let stay: Vec<String> = stay.cloned().collect();
         self.grows.extend(stay);
         measured.leave_out(&self.grows);
         measured
