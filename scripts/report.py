@@ -30,7 +30,7 @@ from maps import draw_state
 from reading import evenly, read_results, states
 from report_pdf import FULL, HIGHEST, SPACE, pages_of
 from results import telling
-from signorini_summaries import bars, folders_of, unit_of, value_of
+from signorini_summaries import bars, flag_of, folders_of, unit_of, value_of
 from table import text_of
 
 # The largest number of frames of the slider.
@@ -139,8 +139,9 @@ def facts(results, left_out=()):
     def text(name, value):
         # A lone foundation has the length and the largest pressure of all contact.
         of_all = name.rpartition(".")[2] if has_one and name.endswith((".contact_length", ".pressure_max")) else name
-        if (extremes.get(name) or extremes.get(of_all) or {}).get("singular"):
-            return f"{value:.2g}, singular"
+        flag, _ = flag_of(extremes.get(name) or extremes.get(of_all))
+        if flag:
+            return f"{value:.2g}, {flag}"
         is_rounded = summary.get("stopped_at") is not None and isinstance(value, float)
         return barred(value, errors.get(of_all)) or (three_digits(value) if is_rounded else value)
 
@@ -172,10 +173,12 @@ def governing(everything, units):
             continue
         x, y = state.nodes[node]
         extreme = (value_of(state.summary, f"extremes.{key}") if state.is_last else None) or {}
-        is_there = extreme.get("singular") and np.allclose(extreme["at"], (x, y), atol=1e-9 * state.size)
-        text = state.barred(key, value) or (least_zeta(value) if key == "zeta_min" else f"{value:.4g}")
+        is_there = extreme and np.allclose(extreme["at"], (x, y), atol=1e-9 * state.size)
+        flag, reason = flag_of(extreme if is_there else None)
+        plain = least_zeta(value) if key == "zeta_min" else f"{value:.{2 if flag else 4}g}"
+        text = state.barred(key, value) or plain
         rows.append((name, text, units.get(kind, ""), f"({x:.4g}, {y:.4g})", f"{state.time:g} {units['time']}",
-                     f"singular: {extreme['singular']}" if is_there else ""))
+                     f"{flag}: {reason}" if flag else ""))
     return rows
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 # The columns of a table, by default.
 COLUMNS = ("end_time", "stopped_by", "stopped_at", "zeta_min", "displacement_max", "work",
            "contact_force", "von_mises_max", "wall_seconds")
+# The ends of columns with the reason why the mesh does not determine an extreme.
+FLAGS = (".singular", ".unresolved")
 # Kinds of units by names of values; "s" and "MB" do not depend on the scene.
 UNITS = {
     "end_time": "time", "stopped_at": "time", "displacement_max": "length", "contact_length": "length", "work": "work",
@@ -53,6 +55,12 @@ def bars(summary):
     return {name: bar for name, bar in figures.items() if bar is not None}
 
 
+def flag_of(extreme):
+    """`singular` or `not resolved` if the mesh does not determine an extreme, and the reason; else two empty texts."""
+    flags = ((name, (extreme or {}).get(key)) for name, key in (("singular", "singular"), ("not resolved", "unresolved")))
+    return next(((name, reason) for name, reason in flags if reason), ("", ""))
+
+
 def units_of(summary):
     """The names of the units of length, force, time and stress, and of units derived from them."""
     units = {"length": "m", "force": "N", "time": "s", "stress": "Pa", **summary.get("units", {})}
@@ -78,7 +86,7 @@ def rows_of(folders, summaries, columns, settings=None):
     """A row for each folder, and the units of columns.
 
     A row has the name of the folder, the settings in which the runs differ, and per column the value, its error bar
-    NAME.bar and the reason NAME.singular, if a run has them. `reached` tells whether the run has the accuracy asked
+    NAME.bar and the reasons NAME.singular and NAME.unresolved, if a run has them. `reached` tells whether the run has the accuracy asked
     for, `status` whether it finished, stopped early or failed.
     """
     settings = settings or [dict(map(str.strip, text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
@@ -91,14 +99,15 @@ def rows_of(folders, summaries, columns, settings=None):
         for name in columns:
             row[name] = value_of(summary, name)
             row[f"{name}.bar"] = bars(summary).get(name.removeprefix("quantities."))
-            row[f"{name}.singular"] = ((summary.get("extremes") or {}).get(name) or {}).get("singular")
+            extreme = (summary.get("extremes") or {}).get(name.removeprefix("quantities.")) or {}
+            row.update({f"{name}{flag}": extreme.get(flag[1:]) for flag in FLAGS})
             if summary and (unit := unit_of(name, units_of(summary))):
                 units.setdefault(name, {})[unit] = units.setdefault(f"{name}.bar", {})[unit] = None
         row["reached"] = {True: "yes", False: "no"}.get(summary.get("reached"))
         error = summary.get("error")
         row["status"] = "failed" if error else "stopped" if summary.get("stopped_by") else "finished"
         rows.append({**row, "error": error})
-    optional = {key for row in rows for key in row if key.endswith((".bar", ".singular")) or key in ("reached", "error")}
+    optional = {key for row in rows for key in row if key.endswith((".bar", *FLAGS)) or key in ("reached", "error")}
     empty = {key for key in optional if all(row[key] is None for row in rows)}
     rows = [{key: value for key, value in row.items() if key not in empty} for row in rows]
     return rows, {name: " or ".join(of) for name, of in units.items()}

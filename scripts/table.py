@@ -10,7 +10,7 @@ import csv
 import sys
 
 from bars import barred
-from signorini_summaries import COLUMNS, folders_of, rows_of, summary_of, unknown
+from signorini_summaries import COLUMNS, FLAGS, flag_of, folders_of, rows_of, summary_of, unknown
 
 
 def text_of(value):
@@ -47,9 +47,10 @@ def printed(rows, units, as_csv=False):
     def cell(row, name):
         value, bar = row.get(name), row.get(f"{name}.bar")
         text = barred(value, bar) if bar is not None and value is not None else None
-        return (text or text_of(value)) + (" singular" if row.get(f"{name}.singular") else "")
+        flag, _ = flag_of({flag[1:]: row.get(f"{name}{flag}") for flag in FLAGS})
+        return f"{value:.2g} {flag}" if flag else text or text_of(value)
 
-    names = list(dict.fromkeys(name for row in rows for name in row if not name.endswith((".bar", ".singular"))))
+    names = list(dict.fromkeys(name for row in rows for name in row if not name.endswith((".bar", *FLAGS))))
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
     lines = [titles(names, units)] + [[cell(row, name) for name in names] for row in rows]
     widths = [max(map(len, column)) for column in zip(*lines)]

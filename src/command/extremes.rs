@@ -55,13 +55,19 @@ pub(super) fn place(quantities: &[(String, f64)], name: &str, shown: &Shown) -> 
     x.is_finite().then(|| shown.mesh.place([x, y]))
 }
 
-/// An extreme with its place: with its bar, or with two digits if it is singular.
-fn extreme(Extreme { name, value, at, singular }: &Extreme, unit: &str, shown: &Shown) -> String {
-    let (value, singular) = match singular.as_deref() {
+/// An extreme with its place: with its bar, or with two digits if the mesh does not determine it.
+fn extreme(extreme: &Extreme, unit: &str, shown: &Shown) -> String {
+    let Extreme { name, value, at, singular, unresolved } = extreme;
+    let reason = match (singular.as_deref(), unresolved) {
         // The place may be smooth: on finer meshes the extreme may lie elsewhere.
-        Some(GROWS) => (format!("{value:.1e}"), ": grows as the mesh is refined"),
-        Some(_) => (format!("{value:.1e}"), ": singular"),
-        None => (shown.figure(*value, name, 4), ""),
+        (Some(GROWS), _) => ": grows as the mesh is refined",
+        (Some(_), _) => ": singular",
+        (None, Some(_)) => ": not resolved",
+        (None, None) => "",
     };
-    format!("{value} {unit} at {}{singular}", shown.mesh.place(*at))
+    let value = match extreme.is_known() {
+        true => shown.extreme(*value, name),
+        false => format!("{value:.1e}"),
+    };
+    format!("{value} {unit} at {}{reason}", shown.mesh.place(*at))
 }

@@ -153,6 +153,8 @@ pub(super) struct Shown<'a> {
     bars: Option<&'a BTreeMap<String, f64>>,
     /// Whether the errors were measured.
     is_measured: bool,
+    /// The estimated error of u from the mesh, relative, in the energy norm: the stresses are hardly more exact.
+    error: f64,
     pub(super) mesh: &'a Mesh,
 }
 
@@ -162,7 +164,9 @@ impl<'a> Shown<'a> {
         let is_measured =
             task.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
         let mesh = task.problem.mesh();
-        Self { bars: outcome.map(|of| &of.errors.figures), is_measured, mesh }
+        let errors = outcome.map(|of| &of.errors);
+        let error = errors.map_or(0.0, |errors| errors.displacement_mesh);
+        Self { bars: errors.map(|errors| &errors.figures), is_measured, error, mesh }
     }
 
     fn bar(&self, name: &str) -> Option<f64> {
@@ -180,6 +184,11 @@ impl<'a> Shown<'a> {
             None => format!("{value:.*e}", self.digits(usual)),
             bar => with_bar(value, bar),
         }
+    }
+
+    /// An extreme with its bar or, without one, with the decimals that the estimated error leaves, at most four.
+    pub(super) fn extreme(&self, value: f64, name: &str) -> String {
+        self.figure(value, name, (-self.error.log10()).ceil().clamp(1.0, 4.0) as usize)
     }
 }
 

@@ -4,7 +4,7 @@ use super::{Measured, NodalStress, principal, stress::Point};
 use crate::{
     model::von_mises,
     petsc::{Communicator, PetscError},
-    problem::{ContactRow, DiscreteProblem, Singular, State, rows_of, whole_and_parts},
+    problem::{Bar, ContactRow, DiscreteProblem, Singular, State, peak, rows_of, whole_and_parts},
 };
 use serde::Serialize;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -24,11 +24,23 @@ pub struct Extreme {
     pub at: [f64; 2],
     /// If the stress is singular there, and so grows as the mesh is refined: the reason.
     pub singular: Option<String>,
+    /// If it is at a peak of the contact pressure that the mesh does not resolve: the reason.
+    pub unresolved: Option<String>,
 }
 
 impl Extreme {
     fn distance(&self, [x, y]: [f64; 2]) -> f64 {
         (x - self.at[0]).hypot(y - self.at[1])
+    }
+
+    /// Does the mesh determine its value?
+    pub fn is_known(&self) -> bool {
+        self.singular.is_none() && self.unresolved.is_none()
+    }
+
+    /// The value, or its opposite if the extreme is a minimum.
+    fn size(&self) -> f64 {
+        if self.name.ends_with("principal_min") { -self.value } else { self.value }
     }
 }
 
@@ -77,19 +89,60 @@ impl Extremes {
             foundations.map(|of| of.map_or(&rows[..], |of| rows_of(&rows, of))).collect();
         let pressure = |row: &ContactRow| (row.pressure, [row.x, row.y]);
         fields.extend(rows_of.iter().map(|rows| rows.iter().map(pressure).collect::<Vec<_>>()));
+        let of_stresses = fields.len() - rows_of.len();
         let mut names = problem.extremes().into_iter();
-        let of_points = names.by_ref().take(fields.len()).zip(&fields).map(|(name, values)| {
-            let own = values.iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied();
+        let of_points = names.by_ref().take(fields.len()).enumerate().map(|(i, name)| {
+            let own = match i.checked_sub(of_stresses) {
+                Some(foundation) => peak(rows_of[foundation]).map(pressure),
+                None => fields[i].iter().max_by(|a, b| a.0.total_cmp(&b.0)).copied(),
+            };
             let (least, rank) = comm.min_with_rank(own.map_or(f64::INFINITY, |(value, _)| -value));
             let at = own.map_or([0.0; 2], |(_, at)| at).map(|x| comm.broadcast(rank, x));
             let value = if name.ends_with("principal_min") { least } else { -least };
-            Extreme { name, value, at, singular: None }
+            Extreme { name, value, at, singular: None, unresolved: None }
         });
         let of_points = of_points.collect();
         let lengths = rows_of.into_iter().map(|rows| problem.supports.contact.length(rows).0);
         let contact_lengths = names.zip(lengths).collect();
         let (_, ends) = problem.supports.contact.length(&rows);
-        Self { comm, of_points, fields, contact_lengths, ends }
+        let unresolved = problem.unresolved_peaks(&rows);
+        let mut extremes = Self { comm, of_points, fields, contact_lengths, ends };
+        for i in 0..extremes.of_points.len() {
+            extremes.of_points[i].at = extremes.of_points[extremes.part_of(i)].at;
+        }
+        let near = extremes.near(&unresolved, 1.001);
+        extremes.of_points.iter_mut().zip(near).for_each(|(of, name)| of.unresolved = name);
+        extremes
+    }
+
+    /// The parts of the whole whose extreme is `i`: their extremes; none if it is the extreme of a part, or of one material
+    /// or foundation.
+    fn parts(&self, i: usize) -> impl Iterator<Item = usize> {
+        let of_part = format!(".{}", self.of_points[i].name);
+        let is_part = move |k: &usize| self.of_points[*k].name.ends_with(&of_part);
+        let is_whole = !self.of_points[i].name.contains('.');
+        (0..self.of_points.len()).filter(move |k| is_whole && is_part(k))
+    }
+
+    /// The extreme of the part in which the extreme `i` lies.
+    fn part_of(&self, i: usize) -> usize {
+        let size = |k: &usize| self.of_points[*k].size();
+        self.parts(i).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(i)
+    }
+
+    /// Sets the bars of the extremes of the whole, from those of its parts:
+    ///
+    /// v ± max_p (v_p + b_p − v),   with v = max_p v_p.
+    pub(super) fn join(&self, bars: &mut [Bar]) {
+        let number = |of: &Extreme| bars.iter().position(|bar| bar.name == of.name);
+        let numbers = Vec::from_iter(self.of_points.iter().map(number));
+        for (i, whole) in self.of_points.iter().enumerate() {
+            let (Some(own), Some(_)) = (numbers[i], numbers[self.part_of(i)]) else { continue };
+            let most =
+                |k: usize| Some(self.of_points[k].size() - whole.size() + bars[numbers[k]?].bar);
+            let most = self.parts(i).filter_map(most).reduce(f64::max);
+            bars[own].bar = most.unwrap_or(bars[own].bar);
+        }
     }
 
     /// The extremes of `state` at the points of `nodal`. They name singular points and, if they were `measured`, say
@@ -107,9 +160,10 @@ impl Extremes {
         let stresses = nodal.stresses(&NodalStress::strained(problem, state), Some(vertices))?;
         let mut extremes = Self::new(problem, state, nodal, &stresses);
         extremes.of_points = extremes.named(&problem.singular_points());
-        for extreme in &mut extremes.of_points {
-            if measured.grows.contains(&extreme.name) {
-                extreme.singular.get_or_insert_with(|| GROWS.to_owned());
+        for i in 0..extremes.of_points.len() {
+            let of = [i, extremes.part_of(i)];
+            if of.iter().any(|&k| measured.grows.contains(&extremes.of_points[k].name)) {
+                extremes.of_points[i].singular.get_or_insert_with(|| GROWS.to_owned());
             }
         }
         Ok(extremes)
@@ -121,14 +175,21 @@ impl Extremes {
         values.chain(self.contact_lengths.iter().map(|(_, length)| *length)).collect()
     }
 
-    /// The extremes of stresses and pressures with the names of the singular `points` of the boundary near which they are,
-    /// within three edges. A singular stress is large at its point itself, if it is known there. Collective.
+    /// The extremes of stresses and pressures with the names of the singular `points` near which they are. Collective.
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
         /// On six bodies half of it changed nothing; twice of it changed meshes.
         const EDGES: f64 = 3.001;
+        let extremes = self.of_points.iter().zip(self.near(points, EDGES));
+        extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
+    }
+
+    /// Per extreme: the name of the nearest of the `points` of the boundary within some `edges`. A stress that is large
+    /// because of a point is large at the point itself, if it is known there. Collective.
+    fn near(&self, points: &[Singular], edges: f64) -> Vec<Option<String>> {
         let named = |(i, extreme): (usize, &Extreme)| {
+            let i = self.part_of(i);
             let near =
-                points.iter().filter(|point| extreme.distance(point.at) <= EDGES * point.radius);
+                points.iter().filter(|point| extreme.distance(point.at) <= edges * point.radius);
             let nearest =
                 near.min_by(|a, b| extreme.distance(a.at).total_cmp(&extreme.distance(b.at)));
             // The von Mises stress, as other stresses may be negative at the point, or the pressure.
@@ -137,10 +198,9 @@ impl Extremes {
             let there = |point: &&Singular| {
                 let own = field.iter().filter(|(_, at)| *at == point.at).map(|(value, _)| *value);
                 let there = self.comm.max(own.fold(f64::NEG_INFINITY, f64::max));
-                there >= 0.5 * extreme.value.abs() || there == f64::NEG_INFINITY
+                there >= 0.5 * extreme.value.abs() || !there.is_finite() || point.at == extreme.at
             };
-            let singular = nearest.filter(there).map(|point| point.name.clone());
-            Extreme { singular, ..extreme.clone() }
+            nearest.filter(there).map(|point| point.name.clone())
         };
         self.of_points.iter().enumerate().map(named).collect()
     }
@@ -175,6 +235,7 @@ impl Extremes {
             });
             c - b > SEEN * c && c - b > INCREASING * (b - a)
         };
-        self.of_points.iter().zip(&self.fields).map(grows).collect()
+        let grow: Vec<bool> = self.of_points.iter().zip(&self.fields).map(grows).collect();
+        (0..grow.len()).map(|i| grow[self.part_of(i)]).collect()
     }
 }

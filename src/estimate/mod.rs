@@ -39,7 +39,7 @@ use crate::{
     },
     fem::RigidMotion,
     petsc::{PetscError, Session},
-    problem::DiscreteProblem,
+    problem::{Bar, DiscreteProblem},
     scene::{Stepping, TimeGrid},
 };
 use nalgebra::DVector;
@@ -106,7 +106,7 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
     let is_known = problem.damage().is_some() && !begins_at_the_end(&damage_step, &outcome);
-    let steps = controller.step_error().filter(|_| is_known);
+    let steps = controller.step_error().filter(|_| is_known && outcome.stopped.is_none());
     outcome.errors = ErrorBudget::new(problem, &outcome, steps.as_ref().map(DVector::as_slice));
     Ok(outcome)
 }
@@ -126,22 +126,41 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
 impl Outcome {
     /// Sets the error bars: the `measured` errors of the mesh plus the errors of the time steps. A run that stopped at
     /// ζ_* has the bar of this time alone, because another mesh stops at another time. There are none if the run has too
-    /// few steps for an estimate.
-    pub fn set_bars(&mut self, problem: &DiscreteProblem, measured: &Measured) {
+    /// few steps for an estimate. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn set_bars(
+        &mut self,
+        problem: &DiscreteProblem,
+        measured: &Measured,
+    ) -> Result<(), PetscError> {
         let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
         if let Some(stop) = &mut self.stopped {
             stop.from_mesh = measured.stop;
-            return;
+            return Ok(());
         }
         self.errors.damage_mesh = measured.damage;
-        if unknown {
-            return;
+        if unknown || measured.bars.is_empty() {
+            return Ok(());
         }
         self.bars = measured.bars.clone();
         let [most, mean] = self.errors.zeta_steps.unwrap_or_default();
         let displacement = self.errors.displacement_steps.unwrap_or(0.0);
         problem.add_step_errors(&mut self.bars, [most, mean, displacement]);
-        self.errors.figures = self.bars.iter().map(|bar| (bar.name.clone(), bar.bar)).collect();
+        let (state, nodal) = (&self.last.state, NodalStress::new(problem));
+        self.set_bars_of_extremes(&Extremes::of(problem, state, &nodal, measured)?);
+        Ok(())
+    }
+
+    /// Sets the bars of the extremes of the whole, and enters the bars in the errors, except those of extremes that the mesh
+    /// does not determine.
+    fn set_bars_of_extremes(&mut self, extremes: &Extremes) {
+        extremes.join(&mut self.bars);
+        let unknown =
+            |bar: &&Bar| extremes.of_points.iter().any(|of| of.name == bar.name && !of.is_known());
+        let known = self.bars.iter().filter(|bar| !unknown(bar));
+        self.errors.figures = known.map(|bar| (bar.name.clone(), bar.bar)).collect();
     }
 
     /// Measures the errors of the time steps by the run `longer`, whose steps had a larger tolerance. Errors are of
@@ -171,20 +190,20 @@ impl Outcome {
             stop.uncertainty = stop.uncertainty.min(measured.max(self.ungrown * stop.uncertainty));
         }
         let nodal = NodalStress::new(problem);
-        let figures = |step: &Step| {
-            let extremes = Extremes::of(problem, &step.state, &nodal, measured)?;
-            Ok([step.figures(), extremes.values()].concat())
-        };
-        let (before, now) = (figures(&longer.last)?, figures(&self.last)?);
+        let [before, extremes] =
+            [longer, &*self].map(|run| Extremes::of(problem, &run.last.state, &nodal, measured));
+        let (before, extremes) = (before?, extremes?);
+        let [before, now] = [(&longer.last, &before), (&self.last, &extremes)]
+            .map(|(step, extremes)| [step.figures(), extremes.values()].concat());
         let names = problem.figure_names();
         for (bar, of_mesh) in self.bars.iter_mut().zip(&measured.bars) {
             if let Some(i) = names.iter().position(|name| *name == bar.name) {
                 let estimated = bar.bar - of_mesh.bar;
                 let measured = factor * (now[i] - before[i]).abs() + problem.tolerance * bar.scale;
                 bar.bar = of_mesh.bar + estimated.min(measured.max(self.ungrown * estimated));
-                self.errors.figures.insert(bar.name.clone(), bar.bar);
             }
         }
+        self.set_bars_of_extremes(&extremes);
         Ok(())
     }
 }

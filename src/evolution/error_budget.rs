@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
-/// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps.
+/// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps, and at ζ_*.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
     /// The error of u from the mesh.

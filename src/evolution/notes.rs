@@ -88,9 +88,11 @@ impl Outcome {
         remarks.into_iter().flatten().collect()
     }
 
-    /// A note on the adaptive steps, if their time error `misses` the tolerance or if it does not.
+    /// A note on the adaptive steps, if their time error `misses` the tolerance or if it does not. At a stop the damage
+    /// grows without bound, and the error of the time of ζ_* counts alone.
     fn adaptive_steps_note(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
-        let error = self.damage_error.filter(|_| problem.damage().is_some())?;
+        let error =
+            self.damage_error.filter(|_| problem.damage().is_some() && self.stopped.is_none())?;
         let Stepping::Auto { tolerance, .. } = problem.scene().time?.stepping else { return None };
         // If an accuracy is required, the program has set the tolerance itself.
         let missed = error > tolerance && problem.scene().accuracy.is_none();

@@ -27,7 +27,7 @@ mod supports;
 mod unresolved;
 
 pub use collapse::Collapse;
-pub(crate) use contact_figures::rows_of;
+pub(crate) use contact_figures::{peak, rows_of};
 pub use contact_line::{ContactLine, ContactRow};
 pub use error::SetupError;
 pub use figures::{Bar, Dimension};

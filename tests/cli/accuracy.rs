@@ -361,3 +361,24 @@ fn no_accuracy_is_promised_where_the_body_turns_over() {
     assert!(said.out.contains("against the rotation about"), "{}", said.out);
     assert!(said.out.contains("accuracy 0.05 reached"), "{}", said.out);
 }
+
+/// Near ζ_* the damage grows without bound, and so does the error of ζ in percent.
+#[test]
+fn after_a_stop_the_errors_are_those_of_its_time_alone() {
+    let directory = TestDirectory::new();
+    for steps in [&["time.step=0.01"][..], &["time.step='auto'", "time.tolerance=0.3"]] {
+        for more in [&["damage.lambda_u=20000"][..], &["damage.lambda_u=5000", "damage.lambda_d=0"]]
+        {
+            let options = sets(&[steps, more].concat());
+            let said = directory.run(&[&options[..], &["--profile"]].concat());
+            let summary = directory.summary("out/scene");
+            assert!(summary["stopped_uncertainty"].as_f64() > Some(0.0), "{}", said.out);
+            for error in ["damage_mesh", "damage_steps", "displacement_steps"] {
+                assert!(summary["errors"][error].is_null(), "{error}: {}", summary["errors"]);
+            }
+            let told = format!("{}{}", said.out, summary["notes"]);
+            assert!(!told.contains("error of the damage"), "{told}");
+            assert!(told.contains("from the time steps: the time of ζ_* off by up to"), "{told}");
+        }
+    }
+}

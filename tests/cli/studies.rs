@@ -41,7 +41,8 @@ fn a_study_runs_all_combinations_once_and_tells_their_figures() {
 
 #[test]
 fn figures_stand_with_units_bars_and_singular_flags() {
-    // The bar is rounded up, the figure to the bar's digit; a figure without a bar stands as it was.
+    // The bar is rounded up, the figure to the bar's digit; a figure without a bar stands as it was, an extreme
+    // that the mesh does not determine with two digits.
     let directory = TestDirectory::new();
     directory.run(&[]);
     let mut summary = directory.summary("out/scene");
@@ -52,18 +53,28 @@ fn figures_stand_with_units_bars_and_singular_flags() {
     summary["errors"]["figures"] =
         serde_json::json!({ "work": 0.00041, "bottom.force_y": 2.7e-11, "contact_force": null });
     summary["extremes"]["von_mises_max"]["singular"] = "a corner".into();
+    summary["pressure_max"] = 291.0.into();
+    summary["extremes"]["pressure_max"] = serde_json::json!({ "value": 291.0, "at": [0, 0], "singular": null, "unresolved": "a kink" });
     summary["reached"] = serde_json::json!(false);
     directory.write("out/scene/summary.json", &summary.to_string());
-    let words = ["table", "out/scene", "--columns", "work,von_mises_max,errors.solver"];
+    let words =
+        ["table", "out/scene", "--columns", "work,von_mises_max,pressure_max,errors.solver"];
     let Some(said) = directory.say_python(&words) else { return };
     assert_eq!(said.code, Some(0), "{said:?}");
-    for text in ["work (J/m)", "5.3570 ± 0.0005", "23153 singular", "reached", " no ", "finished"]
-    {
+    for text in [
+        "work (J/m)",
+        "5.3570 ± 0.0005",
+        "2.3e+04 singular",
+        "2.9e+02 not resolved",
+        "reached",
+        " no ",
+        "finished",
+    ] {
         assert!(said.out.contains(text), "no `{text}` in {}", said.out);
     }
     let csv = directory.say(&[&words[..], &["--csv"]].concat());
     let head = "run,work (J/m),work.bar (J/m),von_mises_max (Pa),von_mises_max.singular,\
-                errors.solver,reached,status";
+                pressure_max (Pa),pressure_max.unresolved,errors.solver,reached,status";
     assert_eq!(csv.out.lines().next(), Some(head));
     assert!(csv.out.contains("scene,5.35702,0.00041,23153.0,a corner,"), "{}", csv.out);
     let unknown = ["table", "out/scene", "--columns", "errors.solvr"];

@@ -71,6 +71,7 @@ pub(super) fn bars(
             _ => bar.bar,
         };
     }
+    coarse.extremes().join(&mut bars);
     bars
 }
 

@@ -1,0 +1,164 @@
+//! Extreme stresses and pressures: the whole agrees with its parts, and an extreme that the mesh does not determine says so.
+
+use crate::test_directory::TestDirectory;
+use serde_json::Value;
+
+/// A block with a round core on two foundations.
+const BLOCK: &str = "DefineConstant[ size = 0.2 ];
+    Point(1) = {0, 0, 0, size}; Point(2) = {0.6, 0, 0, size}; Point(3) = {1, 0, 0, size};
+    Point(4) = {1, 1, 0, size}; Point(5) = {0, 1, 0, size};
+    Point(6) = {0.5, 0.5, 0, size}; Point(7) = {0.75, 0.5, 0, size}; Point(8) = {0.25, 0.5, 0, size};
+    Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 5}; Line(5) = {5, 1};
+    Circle(6) = {7, 6, 8}; Circle(7) = {8, 6, 7};
+    Curve Loop(1) = {1:5}; Curve Loop(2) = {6, 7};
+    Plane Surface(1) = {1, 2}; Plane Surface(2) = {2};
+    Physical Surface(\"rim\") = {1}; Physical Surface(\"core\") = {2};
+    Physical Curve(\"near\") = {1}; Physical Curve(\"far\") = {2};
+    Physical Curve(\"sides\") = {3, 5}; Physical Curve(\"top\") = {4};\n";
+
+fn block(size: f64, degree: u8, young: f64, load: &str) -> String {
+    format!(
+        "mesh = {{ file = 'block.geo', size = {size} }}
+         discretisation.displacement = {degree}
+         material = {{ young = 100, poisson = 0.3, plane = 'strain', core = {{ young = {young} }} }}
+         damage = {{ diffusion = 1, lambda_d = 0, lambda_u = 1000 }}
+         time = {{ end = 1, step = 0.1 }}
+         boundary = [
+            {{ name = 'near', gap = '0.01*(x - 0.4)^2' }}, {{ name = 'far', gap = '0.01*(x - 0.4)^2' }},
+            {{ name = 'sides', symmetry = true }}, {{ name = 'top', traction = [0, '{load}'] }},
+         ]"
+    )
+}
+
+/// The extremes by name, the opposite values of minima.
+fn size(summary: &Value, name: &str) -> f64 {
+    let value = summary["extremes"][name]["value"].as_f64().unwrap();
+    assert_eq!(summary[name].as_f64(), Some(value), "{name}");
+    if name.ends_with("principal_min") { -value } else { value }
+}
+
+#[test]
+fn the_extreme_of_the_whole_is_that_of_the_part_in_which_it_lies() {
+    let directory = TestDirectory::new();
+    directory.write("block.geo", BLOCK);
+    for (size_of_edges, degree, young, load, options) in [
+        (0.1, 1, 1000.0, "-t", &["--bars"][..]),
+        (0.1, 2, 300.0, "-t*(2 - x)", &["--bars"]),
+        (0.2, 2, 1000.0, "-t", &["--bars"]),
+        (0.2, 2, 1000.0, "-t*(2 - x)", &["--bars"]),
+        (0.1, 2, 300.0, "-t*(2 - x)", &["--accuracy", "0.1"]),
+        (0.1, 1, 1000.0, "-t", &[]),
+    ] {
+        directory.write("scene.toml", &block(size_of_edges, degree, young, load));
+        let said = directory.run(options);
+        let summary = directory.summary("out/scene");
+        let bar = |name: &str| summary["errors"]["figures"][name].as_f64();
+        let mut barred = 0;
+        for (whole, parts) in [
+            ("von_mises_max", ["material", "core"]),
+            ("principal_max", ["material", "core"]),
+            ("principal_min", ["material", "core"]),
+            ("pressure_max", ["near", "far"]),
+        ] {
+            let parts = parts.map(|part| format!("{part}.{whole}"));
+            let [low, high] = match size(&summary, &parts[0]) < size(&summary, &parts[1]) {
+                true => [&parts[0], &parts[1]],
+                false => [&parts[1], &parts[0]],
+            };
+            let found = |name: &str, key: &str| summary["extremes"][name][key].clone();
+            for key in ["value", "at", "unresolved"] {
+                assert_eq!(
+                    found(whole, key),
+                    found(high, key),
+                    "P{degree}, {young}, {load}: {whole}"
+                );
+            }
+            // On a finer mesh the extreme may lie in the other part, if that grows.
+            let leaves = !found(low, "singular").is_null() && bar(whole).is_none();
+            let [of_whole, of_part] = [whole, high].map(|name| found(name, "singular"));
+            assert!(of_whole == of_part || leaves, "{whole}: {of_whole}, {of_part}");
+            let above = bar(low).map(|bar| size(&summary, low) + bar - size(&summary, high));
+            let expected = bar(high).map(|bar| above.unwrap_or(0.0).max(bar));
+            match (expected, bar(whole)) {
+                (Some(a), Some(b)) => assert!((a - b).abs() < 1e-9 * a, "{whole}: {a}, {b}"),
+                (a, b) => assert!(b.is_none() && (a.is_none() || leaves), "{whole}: {a:?}, {b:?}"),
+            }
+            barred += usize::from(bar(whole).is_some());
+        }
+        assert_eq!(barred > 0, !options.is_empty(), "{options:?}: {barred} bars");
+
+        // The screen and the history show the same pressures.
+        let pressures: Vec<&str> = said.out.split("largest pressure ").skip(1).collect();
+        let shown = |i: usize| pressures[i].lines().next().unwrap().trim();
+        assert!([1, 2].iter().any(|&i| shown(i) == shown(0)), "{}", said.out);
+        for name in ["near.pressure_max", "far.pressure_max"] {
+            let history = *directory.column("out/scene", name).last().unwrap();
+            let others = [size(&summary, name), summary["quantities"][name].as_f64().unwrap()];
+            // serde_json's numbers may be off in the last digit.
+            assert!(others.iter().all(|other| (other / history - 1.0).abs() < 1e-15), "{name}");
+        }
+    }
+}
+
+/// A square that is pressed on its foundation by the way `pressed`.
+fn on(gap: &str, degree: u8, pressed: f64) -> String {
+    format!(
+        "mesh.file = 'square.msh'
+         discretisation.displacement = {degree}
+         material = {{ young = 1000, poisson = 0.3, plane = 'strain' }}
+         boundary = [{{ name = 'bottom', gap = '{gap}' }}, {{ name = 'top', displacement = [0, -{pressed}] }}]"
+    )
+}
+
+#[test]
+fn a_pressure_on_few_nodes_or_under_a_kink_is_not_resolved_and_a_smooth_one_is() {
+    const FEW: Option<&str> = Some("contact of few nodes of `bottom`");
+    const KINK: Option<&str> = Some("a kink of the gap of `bottom`");
+    let directory = TestDirectory::new();
+    for (gap, n, pressed, expected) in [
+        // Sharp tips, at a node and beside it, and a round one that is sharp on this mesh.
+        ("5*abs(x - 0.5)", 20, 0.01, FEW),
+        ("1*abs(x - 0.48)", 10, 0.03, FEW),
+        ("100*(x - 0.5)^2", 20, 0.01, FEW),
+        // Blunt ones: the contact is wide.
+        ("0.02*abs(x - 0.5)", 10, 0.02, KINK),
+        ("0.02*abs(x - 0.507)", 30, 0.02, KINK),
+        ("0.02*max(x - 0.5, 0)", 20, 0.02, KINK),
+        ("0.02*abs(x - 0.5) + 0.02*(x - 0.5)^2", 20, 0.02, KINK),
+        // Smooth gaps, and a kink that no pressure feels.
+        ("0.05*(x - 0.5)^2", 10, 0.02, None),
+        ("0.5*(x - 0.5)^2", 30, 0.02, None),
+        ("0.02*(1 - cos(6*(x - 0.5)))", 20, 0.02, None),
+        ("0.00001*abs(x - 0.5)", 20, 0.02, None),
+        ("0", 10, 0.02, None),
+    ] {
+        directory.write("square.msh", &crate::test_directory::square(n));
+        for degree in [1, 2] {
+            directory.write("scene.toml", &on(gap, degree, pressed));
+            let said = directory.run(&[]);
+            let found = directory.summary("out/scene")["extremes"]["pressure_max"].clone();
+            let context = format!("{gap}, n = {n}, P{degree}: {found}\n{}", said.out);
+            assert_eq!(found["unresolved"].as_str(), expected, "{context}");
+            let line = said.out.lines().find(|line| line.contains("largest pressure")).unwrap();
+            let shown = line.split("largest pressure ").nth(1).unwrap();
+            let digits = shown.split('e').next().unwrap().len() - 1;
+            assert_eq!(shown.ends_with(": not resolved"), expected.is_some(), "{context}");
+            assert!(digits <= if expected.is_some() { 2 } else { 4 }, "{context}");
+        }
+    }
+}
+
+#[test]
+fn a_pressure_that_is_not_resolved_has_no_bar() {
+    let directory = TestDirectory::new();
+    directory.write("square.msh", &crate::test_directory::square(10));
+    for gap in ["5*abs(x - 0.5)", "0.02*abs(x - 0.5)"] {
+        for degree in [1, 2] {
+            directory.write("scene.toml", &on(gap, degree, 0.01));
+            directory.run(&["--bars"]);
+            let figures = &directory.summary("out/scene")["errors"]["figures"];
+            assert!(figures["pressure_max"].is_null(), "{gap}, P{degree}: {figures}");
+            assert!(figures["contact_force"].as_f64() > Some(0.0), "{gap}, P{degree}: {figures}");
+        }
+    }
+}
