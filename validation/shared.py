@@ -25,8 +25,8 @@ def scales(rows, names):
 
     def kind(name):
         last = name.rpartition(".")[2]
-        of = next((k for k in ("force_", "u_", "zeta", "stress", "von_mises") if last.startswith(k)), last)
-        return "stress" if of == "von_mises" else of
+        of = next((k for k in ("force_", "u_", "zeta", "stress", "von_mises", "principal") if last.startswith(k)), last)
+        return "stress" if of in ("von_mises", "principal") else of
 
     def scale(name):
         if kind(name) == "zeta" and name != "zeta_mean":
