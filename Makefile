@@ -28,7 +28,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
-    bench stability reference converge paper chart accuracy promises \
+    bench stability reference converge paper chart accuracy promises handbook \
     fuzz clean
 
 help:
@@ -51,6 +51,7 @@ help:
 	@echo 'make chart      error against seconds (half an hour; or ARGS=--quick); or CHART="geo/a.toml …"'
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
+	@echo 'make handbook   published and closed answers, with bars and with --accuracy (minutes); or ARGS="hertz_plane"'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
 	@echo 'make clean      remove the build, the results and the meshes'
 
@@ -138,6 +139,9 @@ accuracy: build
 # Truths are kept in out/promises/truth.
 promises: build
 	$(PYTHON) validation/promises.py --binary $(BINARY) $(ARGS)
+
+handbook: build
+	$(PYTHON) validation/handbook.py --binary $(BINARY) $(ARGS)
 
 # What is found stays in target/fuzz; the seeds are those of the tests. FUZZ_RUNS meshes and as many
 # expressions.

@@ -22,7 +22,7 @@ from statistics import median
 
 import numpy as np
 
-from shared import ROOT, parser_of
+from shared import ROOT, parser_of, scales
 from references import kept
 from results import read_table, write_table
 from scene import SceneError
@@ -69,24 +69,6 @@ def figures(summary):
     return {**{name: summary[name] for name in names}, **others}
 
 
-def scales(out, names):
-    """Per figure: the largest value of its kind in the run."""
-    rows = read_table(out / "history.csv")
-    largest = {n: max(abs((n.startswith("zeta_") or n.endswith(".zeta")) - row[n]) for row in rows) for n in names}
-
-    def kind(name):
-        last = name.rpartition(".")[2]
-        of = next((k for k in ("force_", "u_", "zeta", "stress", "von_mises") if last.startswith(k)), last)
-        return "stress" if of == "von_mises" else of
-
-    def scale(name):
-        if kind(name) == "zeta" and name != "zeta_mean":
-            return largest.get("zeta_min", largest[name])
-        return max(v for m, v in largest.items() if kind(m) == kind(name) and ("." in m) == ("." in name))
-
-    return {name: scale(name) for name in names}
-
-
 class Truth:
     """A scene's truth, with its own errors."""
 
@@ -98,7 +80,7 @@ class Truth:
         if self.run.summary["stopped_at"] is not None:
             raise SceneError("the truth stops at ζ_*")
         self.own = {name: abs(figures(other.summary)[name] - value) for name, value in self.figures.items()}
-        self.scales = scales(fine, self.figures)
+        self.scales = scales(read_table(fine / "history.csv"), self.figures)
         self.norms = self.errors(other)
 
     def errors(self, run):

@@ -16,3 +16,21 @@ def parser_of(doc, out=None):
     if out:
         parser.add_argument("--out", type=Path, default=ROOT / "out" / out)
     return parser
+
+
+def scales(rows, names):
+    """Per figure: the largest value of its kind in the rows of a run; of ζ, the largest 1 − ζ."""
+    largest = {n: max(abs((n.startswith("zeta_") or n.endswith(".zeta")) - row[n]) for row in rows if n in row)
+               for n in names if any(n in row for row in rows)}
+
+    def kind(name):
+        last = name.rpartition(".")[2]
+        of = next((k for k in ("force_", "u_", "zeta", "stress", "von_mises", "principal") if last.startswith(k)), last)
+        return "stress" if of in ("von_mises", "principal") else of
+
+    def scale(name):
+        if kind(name) == "zeta" and name != "zeta_mean":
+            return largest.get("zeta_min", largest[name])
+        return max((v for m, v in largest.items() if kind(m) == kind(name) and ("." in m) == ("." in name)), default=0.0)
+
+    return {name: scale(name) for name in names}

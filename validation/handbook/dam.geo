@@ -1,0 +1,15 @@
+// A triangular dam: apex (0, 0), vertical upstream face x = 0, height 1, slope 1.
+DefineConstant[ size = {0.1, Name "Parameters/size"} ];
+Point(1) = {0, 0, 0};
+Point(2) = {0, -1, 0};
+Point(3) = {1, -1, 0};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Line(3) = {3, 1};
+Curve Loop(1) = {1, 2, 3};
+Plane Surface(1) = {1};
+Physical Surface("body") = {1};
+Physical Curve("water") = {1};
+Physical Curve("base") = {2};
+Physical Curve("air") = {3};
+Mesh.MeshSizeMax = size;

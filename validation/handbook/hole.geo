@@ -1,0 +1,22 @@
+// The quarter [0, half] × [0, length] of a strip with a round hole of radius 1 at the origin.
+DefineConstant[ size = {0.2, Name "Parameters/size"}, half = 2, length = 8 ];
+Point(1) = {0, 0, 0};
+Point(2) = {1, 0, 0};
+Point(3) = {half, 0, 0};
+Point(4) = {half, length, 0};
+Point(5) = {0, length, 0};
+Point(6) = {0, 1, 0};
+Line(1) = {2, 3};
+Line(2) = {3, 4};
+Line(3) = {4, 5};
+Line(4) = {5, 6};
+Circle(5) = {6, 1, 2};
+Curve Loop(1) = {1, 2, 3, 4, 5};
+Plane Surface(1) = {1};
+Physical Surface("body") = {1};
+Physical Curve("south") = {1};
+Physical Curve("east") = {2};
+Physical Curve("north") = {3};
+Physical Curve("west") = {4};
+Physical Curve("hole") = {5};
+Mesh.MeshSizeMax = size;

@@ -1,0 +1,19 @@
+// NAFEMS LE1: the quarter between the ellipses (x/2)² + y² = 1 and (x/3.25)² + (y/2.75)² = 1.
+DefineConstant[ size = {0.2, Name "Parameters/size"} ];
+Point(1) = {0, 0, 0};
+Point(2) = {2, 0, 0};
+Point(3) = {3.25, 0, 0};
+Point(4) = {0, 2.75, 0};
+Point(5) = {0, 1, 0};
+Line(1) = {2, 3};
+Ellipse(2) = {3, 1, 3, 4};
+Line(3) = {4, 5};
+Ellipse(4) = {5, 1, 2, 2};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+Physical Surface("body") = {1};
+Physical Curve("first") = {1};
+Physical Curve("outer") = {2};
+Physical Curve("last") = {3};
+Physical Curve("inner") = {4};
+Mesh.MeshSizeMax = size;
