@@ -4,7 +4,7 @@ use super::{Failure, kinks, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
     evolution::{AIM, Outcome, percent},
-    interrupt::{Interrupts, Signal},
+    interrupt::Signal,
     mesh::{CORNER_ANGLE, Kink, Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension},
@@ -34,7 +34,6 @@ pub(super) fn adapt(
             is_first = false;
         }
     };
-    let _interrupts = Interrupts::defer();
     let adapt = || estimate::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
@@ -57,7 +56,6 @@ pub(super) fn measure_errors(
     of_steps: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Measured, Failure> {
-    let _interrupts = Interrupts::defer();
     match estimate::measured_errors(session, scene, mesh, solver, of_steps) {
         Ok(measured) => Ok(measured),
         Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
@@ -93,9 +91,8 @@ pub(super) fn confirm_stop(
 
 /// A signal has ended a run during the adaptation of the mesh.
 fn interrupted(signal: Signal) -> Failure {
-    let message = format!(
-        "ended by {signal} before the run began, while meshes were tried for its accuracy or error bars"
-    );
+    let message =
+        format!("ended by {signal} while meshes were tried for the accuracy or the error bars");
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 

@@ -166,7 +166,7 @@ fn error_bars_hold_on_curved_sides() {
 }
 
 /// Writes the scene of a homogeneous square bar on two symmetric sides, with this condition at its top.
-fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
+pub fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
     directory.write(
         "scene.toml",
         &format!(

@@ -6,13 +6,14 @@ use std::mem;
 
 impl ContactStep<'_> {
     /// u_n at `time` for the nodal damage `zeta`, from the solver. If it stops short, its rescuers try the step, one after
-    /// the other, and the step's report names the one that solves it. Every solve starts from the accepted steps.
+    /// the other, and the step's report names the one that solves it. Every solve starts from the accepted steps; a
+    /// rescuer's without the solver's warm start, which it cannot use.
     ///
     /// # Errors
     /// The solver failed, or neither its answers nor its rescuers' met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let comm = self.problem.body.nodes.partition.comm();
-        let mut failed = match self.solve_by_one(step, time, zeta) {
+        let mut failed = match self.solve_by_one(step, time, zeta, true) {
             Ok(step) => return Ok(step),
             Err(error) => error,
         };
@@ -22,11 +23,10 @@ impl ContactStep<'_> {
                 return Err(failed);
             }
             mem::swap(&mut self.solver, &mut self.rescuers[i]);
-            // A rescuer cannot use the solver's warm start, and after this failure the solver should not either.
-            self.accepted.warm_start.clear();
-            let rescued = self.solve_by_one(step, time, zeta);
+            let rescued = self.solve_by_one(step, time, zeta, false);
             let name = self.solver.name();
             mem::swap(&mut self.solver, &mut self.rescuers[i]);
+            // Nor can the solver use the rescuer's in the next step.
             self.next.warm_start.clear();
             match rescued {
                 // The first error is reported, unless only a rescuer's error states the limit by rounding.

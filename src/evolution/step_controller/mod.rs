@@ -36,7 +36,8 @@ pub(super) enum Decision {
     Stop(Stop),
 }
 
-/// Plans the steps of a run, and accepts or rejects them. Its memory changes only with [`Decision::Accept`].
+/// Plans the steps of a run, and accepts or rejects them. A rejected step changes the length of the next one and nothing else.
+/// The damage system may keep its factor, see `ContactStep::solve_by_one`.
 pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     /// Error control of the damage; `None` for uniform steps.
