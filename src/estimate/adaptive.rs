@@ -205,7 +205,7 @@ pub fn measured_errors(
     let (rounds, triangles) = (1, mesh.triangles.len());
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
-        let run = FewStepRun::run(session, &problem, solver, triangles, FEW)
+        let run = FewStepRun::run(session, &problem, solver, triangles, FEW, &[])
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
         if !repeats || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
@@ -240,13 +240,13 @@ fn refined(
         let mesh = &refinement.mesh;
         let triangles = mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-        let run = FewStepRun::run(session, &problem, solver, triangles, INSTANTS)
+        let run = FewStepRun::run(session, &problem, solver, triangles, INSTANTS, &[])
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
             continue;
         }
         let round = Round::new(&scene, mesh, run, accuracy)?;
-        progress.estimated(triangles, round.estimate());
+        progress.estimated(triangles, round.resolves_data().then(|| round.estimate()));
         let measure = || {
             progress.check_memory(4 * triangles)?;
             Measurement::new(session, &scene, mesh, &round.run, solver, rounds)

@@ -20,7 +20,7 @@ pub(super) struct Progress<'a> {
     accuracy: f64,
     /// The largest number of triangles of a run so far.
     most: usize,
-    /// Per round: the triangles and the estimated error.
+    /// Per round whose mesh resolves the data of the scene: the triangles and the estimated error.
     estimates: Vec<(usize, f64)>,
     /// Per measurement: the triangles and the measured errors.
     excesses: Vec<(usize, BTreeMap<String, f64>)>,
@@ -34,10 +34,10 @@ impl<'a> Progress<'a> {
         Self { session, accuracy, most: 0, estimates, excesses, grows }
     }
 
-    /// Adds a round on `triangles` with its estimated error.
-    pub(super) fn estimated(&mut self, triangles: usize, error: f64) {
+    /// Adds a round on `triangles` with its estimated error, if its mesh resolves the data.
+    pub(super) fn estimated(&mut self, triangles: usize, error: Option<f64>) {
         self.most = self.most.max(triangles);
-        self.estimates.push((triangles, error / self.accuracy));
+        self.estimates.extend(error.map(|error| (triangles, error / self.accuracy)));
     }
 
     /// Adds a measurement of a round on `triangles`. Extremes whose errors stay grow as the mesh is refined.
@@ -81,7 +81,8 @@ impl<'a> Progress<'a> {
         before.reduce(f64::max).is_some_and(|largest| last > 0.5 * largest)
     }
 
-    /// Whether the estimated error has not become half of what it was with a sixty-fourth of the triangles.
+    /// Whether the estimated error has not become half of what it was with a sixty-fourth of the triangles. A mesh that misses
+    /// data of the scene, such as a peak of a foundation, estimates the error of another problem and does not count.
     fn not_of_the_mesh(&self) -> Option<String> {
         let (triangles, last) = *self.estimates.last().filter(|(_, excess)| *excess > 1.0)?;
         let before = self.estimates.iter().filter(|(count, _)| 64 * count <= triangles);
