@@ -115,6 +115,14 @@ pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     (0.0 < factor && factor < 1.0).then_some(factor.min(0.5))
 }
 
+/// Is there time to repeat a run of some `seconds` with a tolerance of the steps that is smaller by `ratio`? Their errors are of
+/// second order. Collective.
+pub(super) fn has_time(task: &Task, seconds: f64, ratio: f64) -> bool {
+    let passed = task.started.elapsed().as_secs_f64();
+    let passed = task.problem.body.nodes.partition.comm().max(passed);
+    task.problem.scene().max_seconds.is_none_or(|most| passed + seconds / ratio.sqrt() <= most)
+}
+
 /// Whether the run stops at ζ_*, but the runs that measure the errors of the mesh do not: the time steps may cause the stop.
 fn is_unconfirmed_stop(task: &Task, outcome: &Outcome) -> bool {
     outcome.stopped.is_some() && task.measured.stop.is_none()
@@ -186,7 +194,11 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     });
     let unconfirmed = "only this run stops at ζ_*, not the runs that measure its errors".to_owned();
     let unconfirmed = is_unconfirmed_stop(task, outcome).then_some(unconfirmed);
-    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed);
+    // Only the limit on the time prevents a repetition.
+    let is_last = task.first.is_some() || shorter_steps(task, outcome).is_none();
+    let limit = "a repetition with shorter steps would take longer than --max-seconds".to_owned();
+    let limit = (!is_last).then_some(limit);
+    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed).chain(limit);
     let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
     let quantities = task.problem.quantities();

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, confirm_stop, measure_errors, shorter_steps},
+    accuracy::{adapt, confirm_stop, has_time, measure_errors, shorter_steps},
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
@@ -229,11 +229,14 @@ fn solve(
         show_again(session.comm());
     }
     loop {
+        let started = Instant::now();
         let (recorder, mut result) = solve_once(&task, restart.take(), session)?;
         if let (Ok(outcome), Some(longer)) = (&mut result, &task.first) {
             outcome.measure_steps(&task.problem, longer, &task.measured)?;
         }
         let ratio = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
+        let seconds = session.comm().max(started.elapsed().as_secs_f64());
+        let ratio = ratio.filter(|ratio| has_time(&task, seconds, *ratio));
         match (result, ratio) {
             (Ok(outcome), Some(ratio)) if task.first.is_none() => {
                 drop(recorder);
