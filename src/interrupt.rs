@@ -52,7 +52,7 @@ fn watch() {
     low_level::exit(signal.exit_code().into());
 }
 
-/// While this exists, a first signal is only recorded, so that the work can end properly.
+/// While this exists, a first signal is only recorded, so that the work can end properly. At most one exists at a time.
 #[derive(Debug)]
 pub struct Interrupts(());
 

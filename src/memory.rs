@@ -14,8 +14,17 @@ pub fn peak() -> f64 {
 /// The memory that this process may still take, bytes; infinite where the system does not report it. The ranks on
 /// a machine and the runs of a study have equal parts of its memory.
 pub fn available() -> f64 {
-    let free = ["MemAvailable:", "SwapFree:"].map(|name| number("/proc/meminfo", name));
-    let free = free.into_iter().sum::<Option<f64>>().map_or(f64::INFINITY, |free| 1024.0 * free);
+    left(&["MemAvailable:", "SwapFree:"])
+}
+
+/// The same without swapping.
+pub(crate) fn free() -> f64 {
+    left(&["MemAvailable:"])
+}
+
+fn left(kinds: &[&str]) -> f64 {
+    let free = kinds.iter().map(|name| number("/proc/meminfo", name));
+    let free = free.sum::<Option<f64>>().map_or(f64::INFINITY, |free| 1024.0 * free);
     let machine = left_by_groups().map_or(free, |left| left.min(free));
     let sharing = ["OMPI_COMM_WORLD_LOCAL_SIZE", "SIGNORINI_RUNS"];
     let sharing = sharing.iter().filter_map(|name| env::var(name).ok()?.parse::<f64>().ok());

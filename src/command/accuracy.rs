@@ -4,7 +4,7 @@ use super::{Failure, kinks, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
     evolution::{AIM, Outcome, percent},
-    interrupt::{Interrupts, Signal},
+    interrupt::Signal,
     mesh::{CORNER_ANGLE, Kink, Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension},
@@ -34,7 +34,6 @@ pub(super) fn adapt(
             is_first = false;
         }
     };
-    let _interrupts = Interrupts::defer();
     let adapt = || estimate::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
@@ -57,7 +56,6 @@ pub(super) fn measure_errors(
     of_steps: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Measured, Failure> {
-    let _interrupts = Interrupts::defer();
     match estimate::measured_errors(session, scene, mesh, solver, of_steps) {
         Ok(measured) => Ok(measured),
         Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
@@ -93,9 +91,8 @@ pub(super) fn confirm_stop(
 
 /// A signal has ended a run during the adaptation of the mesh.
 fn interrupted(signal: Signal) -> Failure {
-    let message = format!(
-        "ended by {signal} before the run began, while meshes were tried for its accuracy or error bars"
-    );
+    let message =
+        format!("ended by {signal} while meshes were tried for the accuracy or the error bars");
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 
@@ -116,6 +113,14 @@ pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     let limit = if is_unconfirmed_stop(task, outcome) { 0.5 } else { 1.0 };
     let factor = factor.fold(limit, f64::min);
     (0.0 < factor && factor < 1.0).then_some(factor.min(0.5))
+}
+
+/// Is there time to repeat a run of some `seconds` with a tolerance of the steps that is smaller by `ratio`? Their errors are of
+/// second order. Collective.
+pub(super) fn has_time(task: &Task, seconds: f64, ratio: f64) -> bool {
+    let passed = task.started.elapsed().as_secs_f64();
+    let passed = task.problem.body.nodes.partition.comm().max(passed);
+    task.problem.scene().max_seconds.is_none_or(|most| passed + seconds / ratio.sqrt() <= most)
 }
 
 /// Whether the run stops at ζ_*, but the runs that measure the errors of the mesh do not: the time steps may cause the stop.
@@ -189,7 +194,11 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     });
     let unconfirmed = "only this run stops at ζ_*, not the runs that measure its errors".to_owned();
     let unconfirmed = is_unconfirmed_stop(task, outcome).then_some(unconfirmed);
-    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed);
+    // Only the limit on the time prevents a repetition.
+    let is_last = task.first.is_some() || shorter_steps(task, outcome).is_none();
+    let limit = "a repetition with shorter steps would take longer than --max-seconds".to_owned();
+    let limit = (!is_last).then_some(limit);
+    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed).chain(limit);
     let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
     let quantities = task.problem.quantities();

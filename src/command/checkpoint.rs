@@ -7,8 +7,8 @@
 use super::{Failure, ranks::agree, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
-    estimate::Adapted,
-    evolution::RunState,
+    estimate::{Adapted, Measured},
+    evolution::{Outcome, RunState},
     output::{self, FieldsWritten, OutputError},
     petsc::Communicator,
     scene::AsRun,
@@ -21,7 +21,7 @@ use std::{
 };
 
 /// The first line of a file.
-const FORMAT: &[u8] = b"signorini checkpoint 4\n";
+const FORMAT: &[u8] = b"signorini checkpoint 5\n";
 
 /// The state of a run between two steps.
 #[derive(Serialize, Deserialize)]
@@ -30,6 +30,8 @@ pub struct Checkpoint {
     origin: [u64; 3],
     /// The adapted mesh and its errors.
     pub adapted: Option<Adapted>,
+    /// In a repetition with shorter steps: the first run, the errors of the mesh, and the notes.
+    pub first: Option<(Outcome, Measured, Vec<String>)>,
     pub recorded: Recorded,
     pub run: RunState,
 }
@@ -124,8 +126,10 @@ pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), Outpu
     let (comm, folder) = (task.problem.body.nodes.partition.comm(), &task.folder);
     let (step, adapted) = (run.last().record.step, task.adapted.clone());
     let path = path(folder, step, comm.rank());
+    let of_first = |outcome| (outcome, task.measured.clone(), task.notes.clone());
+    let first = task.first.clone().map(of_first);
     let checkpoint =
-        Checkpoint { ranks: comm.size(), origin: origin(task), adapted, recorded, run };
+        Checkpoint { ranks: comm.size(), origin: origin(task), adapted, first, recorded, run };
     let write = || {
         let content = postcard::to_stdvec(&checkpoint).map_err(|e| OutputError::new(&path, e))?;
         let file = [FORMAT, &hash(&content).to_le_bytes(), &content].concat();

@@ -117,6 +117,14 @@ pub struct SceneArguments {
     /// NAME.force_x … as in summary.json), or of several, with commas.
     #[arg(long, value_delimiter = ',', value_name = "NAME")]
     accuracy_of: Vec<String>,
+    /// Begin no finer mesh for the accuracy that would need more memory on all ranks [default: half of the free
+    /// memory at the start].
+    #[arg(long, value_name = "MB")]
+    max_memory: Option<f64>,
+    /// Begin no finer mesh, and no repetition with shorter steps, for the accuracy after which the run would take longer;
+    /// meshes may take half of it.
+    #[arg(long, value_name = "S")]
+    max_seconds: Option<f64>,
     /// Override a key of the scene, e.g. --set time.step=0.005; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -150,16 +158,24 @@ impl SceneArguments {
 
     /// The scene with its overrides and those in `more`, and notes for the user.
     fn read(&self, more: &[String]) -> Result<(Scene, Vec<String>), Failure> {
-        let accuracy = self.accuracy.map(|error| format!("accuracy={error}"));
+        let keys = ["accuracy", "max_memory", "max_seconds"];
+        let values = [self.accuracy, self.max_memory, self.max_seconds].into_iter().zip(keys);
+        let asked = values.filter_map(|(value, key)| Some(format!("{key}={}", value?)));
         let quoted: Vec<_> = self.accuracy_of.iter().map(|name| format!("'{name}'")).collect();
         let figures = (!quoted.is_empty()).then(|| format!("accuracy_of=[{}]", quoted.join(",")));
-        let asked = Vec::from_iter(accuracy.into_iter().chain(figures));
+        let asked = Vec::from_iter(asked.chain(figures));
         let set = [&self.set[..], &asked, more].concat();
         let mut scene = Scene::read(&self.scene, &set).map_err(Failure::input)?;
-        if scene.accuracy.is_none() && !scene.accuracy_of.is_empty() {
-            return Err(Failure::input(
-                "accuracy_of has no effect without accuracy; add accuracy = 0.01, say, or --accuracy 0.01",
-            ));
+        let idle = [
+            ("accuracy_of", !scene.accuracy_of.is_empty()),
+            ("max_memory", scene.max_memory.is_some()),
+            ("max_seconds", scene.max_seconds.is_some()),
+        ];
+        let idle = idle.into_iter().find(|(_, given)| *given && scene.accuracy.is_none());
+        if let Some((key, _)) = idle {
+            return Err(Failure::input(format!(
+                "{key} has no effect without accuracy; add accuracy = 0.01, say, or --accuracy 0.01"
+            )));
         }
         let is_chosen = |set: &&String| CHOSEN.contains(&key_of(set));
         let unused = self.set.iter().filter(|_| scene.accuracy.is_some()).find(is_chosen);

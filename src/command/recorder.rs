@@ -9,7 +9,7 @@ use super::{
 };
 use signorini::{
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
-    interrupt::{Interrupts, received},
+    interrupt::received,
     memory,
     output::{
         self, FieldWriter, OutputError, Table,
@@ -36,7 +36,6 @@ pub(super) struct Recorder<'a> {
     last: Option<Step>,
     /// The time of all accepted steps after n = 0, s.
     stepping: f64,
-    _interrupts: Interrupts,
     /// The time of the last checkpoint.
     saved: Instant,
 }
@@ -46,11 +45,11 @@ impl<'a> Recorder<'a> {
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
-        let (_interrupts, saved) = (Interrupts::defer(), Instant::now());
+        let saved = Instant::now();
         let more = [columns(&task.problem), vec!["seconds".to_owned()]].concat();
         let history = Table::new(task.folder.join("history.csv"), &StepRecord::default(), &more)?;
         let (last, stepping) = Default::default();
-        Ok(Self { task, fields, bar, history, last, stepping, _interrupts, saved })
+        Ok(Self { task, fields, bar, history, last, stepping, saved })
     }
 
     /// Continues from a checkpoint and shows its time.

@@ -2,7 +2,7 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, confirm_stop, measure_errors, shorter_steps},
+    accuracy::{adapt, confirm_stop, has_time, measure_errors, shorter_steps},
     check::contact_nodes,
     check_petsc, check_solver,
     checkpoint::Checkpoint,
@@ -17,6 +17,7 @@ use clap::Args;
 use signorini::{
     estimate::{self, Measured},
     evolution::{Outcome, Phases, RunError},
+    interrupt::Interrupts,
     linear::LinearSolver,
     mesh::Mesh,
     output::{self, terminal::say},
@@ -172,6 +173,7 @@ fn read<'a>(
         tell("warning", &format!("{folder} has no checkpoint; the run begins at its start"));
     }
     let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
+    let _interrupts = Interrupts::defer();
     let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
@@ -200,8 +202,10 @@ fn read<'a>(
         as_run,
         adapted,
         measured,
+        first: None,
         notes,
         _lock: lock,
+        _interrupts,
         petsc: &arguments.petsc,
         profile: arguments.profile,
         phases,
@@ -219,27 +223,38 @@ fn solve(
 ) -> Result<(), Failure> {
     let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&task));
     agree(session.comm(), checked)?;
-    // The run with longer steps.
-    let mut longer: Option<Outcome> = None;
+    let first = restart.as_mut().and_then(|checkpoint| checkpoint.first.take());
+    if let Some((outcome, measured, notes)) = first {
+        (task.first, task.measured, task.notes) = (Some(outcome), measured, notes);
+        show_again(session.comm());
+    }
     loop {
+        let started = Instant::now();
         let (recorder, mut result) = solve_once(&task, restart.take(), session)?;
-        if let (Ok(outcome), Some(longer)) = (&mut result, &longer) {
+        if let (Ok(outcome), Some(longer)) = (&mut result, &task.first) {
             outcome.measure_steps(&task.problem, longer, &task.measured)?;
         }
         let ratio = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
+        let seconds = session.comm().max(started.elapsed().as_secs_f64());
+        let ratio = ratio.filter(|ratio| has_time(&task, seconds, *ratio));
         match (result, ratio) {
-            (Ok(outcome), Some(ratio)) if longer.is_none() => {
+            (Ok(outcome), Some(ratio)) if task.first.is_none() => {
                 drop(recorder);
-                if session.comm().is_root() {
-                    let text = "with shorter time steps, which the accuracy needs";
-                    say(&screen::row("again", text.to_owned()));
-                }
                 confirm_stop(session, &mut task, &outcome)?;
                 task.shorten_steps(ratio);
-                longer = Some(outcome);
+                task.first = Some(outcome);
+                show_again(session.comm());
             }
             (result, _) => return finish(recorder, result, session.comm()),
         }
+    }
+}
+
+/// Shows that the run is a repetition.
+fn show_again(comm: Communicator) {
+    if comm.is_root() {
+        let text = "with shorter time steps, which the accuracy needs";
+        say(&screen::row("again", text.to_owned()));
     }
 }
 

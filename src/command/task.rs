@@ -2,7 +2,8 @@
 
 use signorini::{
     estimate::{Adapted, Measured},
-    evolution::Phases,
+    evolution::{Outcome, Phases},
+    interrupt::Interrupts,
     problem::DiscreteProblem,
     scene::AsRun,
 };
@@ -25,10 +26,14 @@ pub struct Task<'a> {
     pub adapted: Option<Adapted>,
     /// The measured errors of the mesh; empty if they were not measured.
     pub measured: Measured,
+    /// In a repetition with shorter steps: the run before.
+    pub first: Option<Outcome>,
     /// Notes on the arguments and on the error bars.
     pub notes: Vec<String>,
     /// The lock of the folder against other runs.
     pub _lock: Option<File>,
+    /// Signals are deferred from the first run on, whichever follows.
+    pub _interrupts: Interrupts,
     pub petsc: &'a [String],
     /// Whether to print the table of phases.
     pub profile: bool,

@@ -17,6 +17,7 @@
 
 mod changes;
 mod finer;
+mod limits;
 mod measurement;
 mod few_step_run;
 mod progress;
@@ -33,6 +34,7 @@ use crate::{
 };
 pub use few_step_run::INSTANTS;
 use few_step_run::{FEW, FewStepRun};
+use limits::Limits;
 use measurement::Measurement;
 use progress::Progress;
 use round::Round;
@@ -205,7 +207,7 @@ pub fn measured_errors(
     let (rounds, triangles) = (1, mesh.triangles.len());
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
-        let run = FewStepRun::run(session, &problem, solver, triangles, FEW)
+        let run = FewStepRun::run(session, &problem, solver, triangles, FEW, &[])
             .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
         if !repeats || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
@@ -223,7 +225,9 @@ fn check_figures(scene: &Scene, mesh: &Mesh) -> Result<(), SetupError> {
     Ok(scene.check_figures(&names.iter().map(String::as_str).collect::<Vec<_>>())?)
 }
 
-/// Refines `mesh` for a scene with few steps; an error if a run fails.
+/// Refines `mesh` for a scene with few steps; an error if a run fails. A round is begun only if its measurement is within
+/// the limits too, because only a measurement reaches the accuracy. So a mesh that no further round follows can be
+/// measured.
 fn refined(
     session: &Session,
     mut scene: Scene,
@@ -234,47 +238,65 @@ fn refined(
 ) -> Result<Adapted, AdaptError> {
     let mut refinement = Refinement::start(mesh);
     let mut rounds = 0;
-    let mut progress = Progress::new(session, accuracy);
+    let (mut progress, mut limits) = (Progress::new(accuracy), Limits::new(session.comm(), &scene));
     loop {
         rounds += 1;
         let mesh = &refinement.mesh;
         let triangles = mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-        let run = FewStepRun::run(session, &problem, solver, triangles, INSTANTS)
-            .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let run = || FewStepRun::run(session, &problem, solver, triangles, INSTANTS, &[]);
+        let run = limits.measure(triangles, run);
+        let run = run.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
             continue;
         }
         let round = Round::new(&scene, mesh, run, accuracy)?;
-        progress.estimated(triangles, round.estimate());
-        let measure = || {
-            progress.check_memory(4 * triangles)?;
-            Measurement::new(session, &scene, mesh, &round.run, solver, rounds)
+        progress.estimated(triangles, round.resolves_data().then(|| round.estimate()));
+        // The measured errors, or the reason why there are none.
+        let measure = |progress: &mut Progress, limits: &mut Limits| {
+            let new = || Measurement::new(session, &scene, mesh, &round.run, solver, rounds);
+            match limits.exceeded(&[4 * triangles]) {
+                Some(limit) => Ok(Err(limit)),
+                None => match limits.measure(4 * triangles, new) {
+                    Ok(measured) => Ok(Ok(progress.measured(triangles, measured))),
+                    Err(error) if error.signal().is_some() => Err(error),
+                    Err(error) => Ok(Err(error.to_string())),
+                },
+            }
         };
-        let (measured, failed) = match round.is_enough().then(measure) {
-            Some(Ok(measured)) => (Some(progress.measured(triangles, measured)), None),
-            Some(Err(error)) if error.signal().is_some() => return Err(error),
-            Some(Err(error)) => (None, Some(error.to_string())),
-            None => (None, None),
+        let is_enough = round.is_enough();
+        let (mut measured, failed) = match is_enough {
+            true => measure(&mut progress, &mut limits)?
+                .map_or_else(|e| (None, Some(e)), |m| (Some(m), None)),
+            false => (None, None),
         };
-        let measured = measured.as_ref();
-        let errors = measured.map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
-        let exhausted = rounds >= MAX_ROUNDS || 4 * triangles > MAX_TRIANGLES;
-        let limit = || "the limit on rounds or triangles is reached".to_owned();
-        let grown = measured.and_then(|measured| measured.grown(&scene.accuracy_of));
-        let is_grown = grown.is_some();
-        let short = failed.or(grown).or_else(|| progress.stuck(&errors));
-        let short = short.or(exhausted.then(limit));
+        let errors = measured.as_ref().map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
+        let limit = || "the limit on rounds is reached".to_owned();
+        let grown = measured.as_ref().and_then(|of| of.grown(&scene.accuracy_of));
         let within = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
-        let reached = within && !is_grown;
-        let ends = reached || short.is_some();
-        let adapted = round.adapted(measured, rounds, short.filter(|_| !reached));
-        seen(&adapted);
-        if ends {
-            return Ok(adapted);
+        let reached = within && grown.is_none();
+        let mut short = failed.or(grown).or_else(|| progress.stuck(&errors));
+        short = short.or((rounds >= MAX_ROUNDS).then(limit)).filter(|_| !reached);
+        let mut next = None;
+        if !reached && short.is_none() {
+            match round.refined(&refinement, measured.as_ref()) {
+                Ok(finer) => {
+                    let triangles = finer.mesh.triangles.len();
+                    short = limits.exceeded(&[triangles, 4 * triangles]);
+                    next = short.is_none().then_some(finer);
+                }
+                Err(error) => short = Some(error.to_string()),
+            }
         }
-        refinement = round.refined(&refinement, measured)?;
-        progress.check_memory(refinement.mesh.triangles.len())?;
+        if short.is_some() && !is_enough {
+            measured = measure(&mut progress, &mut limits)?.ok();
+        }
+        let adapted = round.adapted(measured.as_ref(), rounds, short);
+        seen(&adapted);
+        match next {
+            Some(finer) => refinement = finer,
+            None => return Ok(adapted),
+        }
     }
 }
 

@@ -73,7 +73,7 @@ pub fn run_from(
     observer: &mut dyn Observer,
     saved: Option<RunState>,
 ) -> Result<Outcome, RunError> {
-    estimated(all_steps(session, problem, solver, phases, observer, saved)?)
+    estimated(all_steps(session, problem, solver, phases, observer, saved, &[])?)
 }
 
 /// Whether the damage of a run with equal steps begins with its last ones: one more step would do far more damage than all

@@ -148,9 +148,16 @@ impl<'a> ContactStep<'a> {
         self.accepted.warm_start = warm_start.to_vec();
     }
 
-    /// u_n at `time` for the nodal damage `zeta`, by the current solver. Every solve starts from the accepted
-    /// steps; rejected steps leave no trace.
-    fn solve_by_one(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
+    /// u_n at `time` for the nodal damage `zeta`, by the current solver. Every solve starts from the accepted steps, and from
+    /// their warm start if it `is_warm`. A rejected step leaves K and the factor of K alone behind. The next solve
+    /// replaces K; another factor changes answers within the tolerance, and the iterations of a method.
+    fn solve_by_one(
+        &mut self,
+        step: usize,
+        time: f64,
+        zeta: &[f64],
+        is_warm: bool,
+    ) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
         let (comm, zeta_at_points) =
@@ -164,6 +171,9 @@ impl<'a> ContactStep<'a> {
         }
         let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
         self.start(&case)?;
+        if !is_warm {
+            self.next.warm_start.clear();
+        }
         let (Candidate { u, kkt, scales, force, unbalanced, contact, .. }, report) =
             self.solve_certified(step, &case)?;
         self.next.scales = scales;

@@ -75,11 +75,11 @@ pub fn run(
     accepted: &mut dyn FnMut(&Step) -> Observed,
 ) -> Result<Outcome, RunError> {
     let observer = &mut Callback(accepted);
-    all_steps(session, problem, solver, phases, observer, None).map(|run| run.outcome)
+    all_steps(session, problem, solver, phases, observer, None, &[]).map(|run| run.outcome)
 }
 
-/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
-/// Everything at the end is returned.
+/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given. Adaptive
+/// steps end at the times `followed` of another run. Everything at the end is returned.
 ///
 /// # Errors
 /// See [`run`].
@@ -90,6 +90,7 @@ pub(crate) fn all_steps<'a>(
     phases: &'a Phases,
     observer: &mut dyn Observer,
     saved: Option<RunState>,
+    followed: &'a [f64],
 ) -> Result<Run<'a>, RunError> {
     let damage_step = DamageStep { session, problem, phases, system: None, loaded: None };
     let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
@@ -101,7 +102,7 @@ pub(crate) fn all_steps<'a>(
         contact_step.accept(start)?;
         source = damage_step.source(&first.state);
     }
-    let controller = StepController::new(problem, &zeta, source);
+    let controller = StepController::new(problem, &zeta, source, followed);
     let outcome = Outcome::new(first);
     let mut run = Run { damage_step, contact_step, controller, outcome };
     match saved {

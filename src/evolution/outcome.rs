@@ -12,13 +12,12 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
 
-/// The outcome of a run that did not fail. A checkpoint omits the fields that are known only at the end.
+/// The outcome of a run that did not fail. A checkpoint omits fields that are known only at the end.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outcome {
     /// The last accepted step.
     pub last: Step,
     /// The stop at ζ_*, if it was reached.
-    #[serde(skip)]
     pub stopped: Option<Stop>,
     /// Worst KKT residuals of all steps.
     pub kkt: Kkt,
@@ -60,7 +59,7 @@ pub struct Outcome {
 }
 
 /// The stop at ζ_*.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub struct Stop {
     /// The time, s: the first t_n with min ζ ≤ ζ_*, or with two-step differences an interpolated time.
     pub time: f64,

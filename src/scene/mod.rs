@@ -64,6 +64,10 @@ pub struct Scene {
     pub accuracy: Option<f64>,
     /// The figures that must have the accuracy; if empty, all figures, u and the damage.
     pub accuracy_of: Vec<String>,
+    /// The memory, MB, and the time, s, that a run with an accuracy may take.
+    pub max_memory: Option<f64>,
+    /// See `max_memory`.
+    pub max_seconds: Option<f64>,
     /// The time grid; `None` for one static solve at t = 1.
     pub time: Option<TimeGrid>,
     /// Body force f_B, N/m³.

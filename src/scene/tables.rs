@@ -31,6 +31,7 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let damage = found.build("damage", damage);
     let accuracy: Option<f64> = found.build("accuracy", Ok);
     let accuracy_of: Option<Vec<String>> = found.build("accuracy_of", Ok);
+    let [max_memory, max_seconds] = ["max_memory", "max_seconds"].map(|key| found.build(key, Ok));
     let degree: Option<f64> = found.build("discretisation.displacement", Ok);
     let time = found.build("time", time);
     let body_force = found.build("body.force", Ok);
@@ -68,6 +69,8 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
         order: if degree == 2.0 { Order::Quadratic } else { Order::Linear },
         accuracy,
         accuracy_of: accuracy_of.unwrap_or_default(),
+        max_memory,
+        max_seconds,
         time,
         body_force: body_force?,
         gravity: gravity?,

@@ -166,7 +166,7 @@ fn error_bars_hold_on_curved_sides() {
 }
 
 /// Writes the scene of a homogeneous square bar on two symmetric sides, with this condition at its top.
-fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
+pub fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
     directory.write(
         "scene.toml",
         &format!(
@@ -380,5 +380,47 @@ fn after_a_stop_the_errors_are_those_of_its_time_alone() {
             assert!(!told.contains("error of the damage"), "{told}");
             assert!(told.contains("from the time steps: the time of ζ_* off by up to"), "{told}");
         }
+    }
+}
+
+/// An accuracy that takes far finer meshes than the limits allow. The force is within its bar, where the mesh could be
+/// measured, and the memory within its limit.
+#[test]
+fn meshes_beyond_the_limits_of_memory_and_time_are_not_begun() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'square.msh'
+         material = { young = 1000, poisson = 0.3, plane = 'stress' }
+         boundary = [{ name = 'left', displacement = [0, 0] }, { name = 'bottom', gap = 0 },
+                     { name = 'top', traction = [0, -1] }]",
+    );
+    let asked =
+        |accuracy, more: &[&str]| directory.run(&[&["--accuracy", accuracy], more].concat());
+    let force = || {
+        let summary = directory.summary("out/scene");
+        let bar = summary["errors"]["figures"]["contact_force"].as_f64();
+        (summary["contact_force"].as_f64().unwrap(), bar)
+    };
+    asked("0.003", &[]);
+    let (exact, off) = force();
+    for (option, limit, is_measured) in [
+        ("--max-memory", "90", true),
+        ("--max-memory", "200", true),
+        ("--max-memory", "10", false),
+        ("--max-seconds", "1e-3", false),
+    ] {
+        let said = asked("0.0003", &[option, limit]);
+        let summary = directory.summary("out/scene");
+        assert!(said.out.contains("NOT reached (") && said.out.contains(option), "{}", said.out);
+        assert_eq!(summary["reached"], false);
+        let (force, bar) = force();
+        assert_eq!(bar.is_some(), is_measured, "{option} {limit}: {}", said.out);
+        let allowed = bar.map_or(f64::INFINITY, |bar| bar + off.unwrap());
+        assert!((force - exact).abs() <= allowed, "{force} ± {allowed}, not {exact}");
+        let peak = summary["peak_megabytes"].as_f64().unwrap();
+        assert!(!is_measured || peak < limit.parse().unwrap(), "{peak} MB of {limit}");
+        let alone = ["run", "scene.toml", option, limit];
+        directory.say(&alone).fails(2, &["has no effect without accuracy"]);
     }
 }

@@ -9,10 +9,11 @@ use signorini::{
 
 /// Pressed on a wavy foundation until t = 1, harder on the left; then torn off it on the right.
 /// Where the left is an axis, only contact supports the body.
-fn scene(left: &str) -> DiscreteProblem {
+fn scene(left: &str, iterations: &str) -> DiscreteProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'strain' }}
          time = {{ end = 2, step = 0.1 }}
+         contact.penalty_duality.iterations = {iterations}
          boundary = [
             {{ name = 'left', {left} }},
             {{ name = 'bottom', gap = '0.01 + 0.01*cos(9*x)' }},
@@ -49,7 +50,7 @@ fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>,
 #[test]
 fn a_rejected_step_leaves_no_trace() {
     for left in ["displacement = [0, 0]", "symmetry = true"] {
-        let problem = scene(left);
+        let problem = scene(left, "1000");
         // Another contact zone; a stiffness that is not positive definite; none at all.
         let torn = (1.8, zeta(&problem, 0.4), true);
         let negative = (1.0, zeta(&problem, -0.5), false);
@@ -76,6 +77,21 @@ fn a_rejected_step_leaves_no_trace() {
             }
         }
     }
+}
+
+/// Sixty iterations of penalty-duality do not solve the body torn off its foundation: the active set does. The next try starts
+/// with the ω of the accepted step all the same.
+#[test]
+fn a_rescued_step_that_is_rejected_leaves_no_trace() {
+    let (solver, left) = ("penalty-duality", "displacement = [0, 0]");
+    let torn = |problem: &DiscreteProblem, succeeds| vec![(1.8, zeta(problem, 0.4), succeeds)];
+    let alone = scene(left, "60\n contact.rescue = false");
+    second_step(&alone, solver, &torn(&alone, false));
+    let problem = scene(left, "60");
+    let plain = second_step(&problem, solver, &[]);
+    let step = second_step(&problem, solver, &torn(&problem, true));
+    assert!(plain.report.omega.is_some() && plain.report.rescued_by.is_none());
+    assert_eq!(step.report.omega, plain.report.omega);
 }
 
 /// Pressed on the foundation and let go by a solver of little patience: penalty-duality without

@@ -39,13 +39,12 @@ pub(super) fn bars(
     grows: &[String],
 ) -> Vec<Bar> {
     let end = coarse.outcome.last.state.time;
-    let times: Vec<f64> = (0..=INSTANTS).map(|i| end * i as f64 / INSTANTS as f64).collect();
-    let changes: Vec<Vec<f64>> = (times.iter())
-        .map(|&time| {
-            let pair = coarse.figures_at(time).into_iter().zip(fine.figures_at(time));
-            pair.map(|(before, now)| now - before).collect()
-        })
-        .collect();
+    let change_at = |i: usize| -> Vec<f64> {
+        let (time, before) = coarse.figures_from(end * i as f64 / INSTANTS as f64);
+        let (_, now) = fine.figures_from(*time);
+        now.iter().zip(before).map(|(now, before)| now - before).collect()
+    };
+    let changes: Vec<Vec<f64>> = (0..=INSTANTS).map(change_at).collect();
     let change = |i: usize| {
         let squares: f64 = changes.iter().map(|change| change[i] * change[i]).sum();
         (squares / changes.len() as f64).sqrt().max(changes[INSTANTS][i].abs())

@@ -5,9 +5,10 @@ use crate::{
         Extremes, NodalStress, RecoveredStrains, UNLOADED,
         damage_interpolation::interpolation_shares,
     },
-    evolution::{self, Outcome, Phases, RunError, Step},
+    evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State},
+    scene::APART,
 };
 use std::cmp::Ordering;
 
@@ -52,18 +53,22 @@ struct History {
 }
 
 impl<'a> FewStepRun<'a> {
-    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at about `instants` times. Collective.
+    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at about `instants` times. Adaptive steps end at
+    /// the times `followed` of the run with which this one is compared. Collective.
     pub(super) fn run(
         session: &Session,
         problem: &'a DiscreteProblem,
         solver: &str,
         triangles: usize,
         instants: usize,
+        followed: &[f64],
     ) -> Result<Self, RunError> {
         let mut history = History::new(problem, instants, triangles);
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
-        let outcome = evolution::run(session, problem, solver, &phases, &mut observe)?;
+        let observer = &mut Callback(&mut observe);
+        let outcome =
+            all_steps(session, problem, solver, &phases, observer, None, followed)?.outcome;
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;
         }
@@ -113,13 +118,16 @@ impl<'a> FewStepRun<'a> {
         self.problem.figure_scales(&sizes, *energy)
     }
 
-    /// The figures at `time`, s, affine between the steps, except the extremes.
-    pub(super) fn figures_at(&self, time: f64) -> Vec<f64> {
+    /// The times at which steps end, s.
+    pub(super) fn times(&self) -> Vec<f64> {
+        self.history.figures.iter().map(|(time, _)| *time).collect()
+    }
+
+    /// The first end of a step from `time` on, s, with the figures there, except the extremes.
+    pub(super) fn figures_from(&self, time: f64) -> &(f64, Vec<f64>) {
         let figures = &self.history.figures;
-        let after = figures.partition_point(|(t, _)| *t < time).min(figures.len() - 1);
-        let [(t0, before), (t1, next)] = [&figures[after.saturating_sub(1)], &figures[after]];
-        let part = if t1 > t0 { ((time - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 1.0 };
-        before.iter().zip(next).map(|(a, b)| (1.0 - part) * a + part * b).collect()
+        let after = figures.partition_point(|(end, _)| *end < (1.0 - APART) * time);
+        &figures[after.min(figures.len() - 1)]
     }
 
     /// The extremes at the end.

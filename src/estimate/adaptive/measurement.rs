@@ -2,8 +2,8 @@
 //!
 //! This halves the size of all triangles, and an error of order p falls by 2^p. The figure F changes by
 //! F(h/2) − F(h) = (1 − 2^−p) e(h). So its error e(h) is twice the change for p = 1, and at most c times the
-//! change, with c = 2½ for p ≥ 0.74 in P2 and c = 4 for p ≥ 0.41 in P1. The change at one time may be zero by chance,
-//! so the bar of a figure is
+//! change, with c = 2½ for p ≥ 0.74 in P2 and c = 4 for p ≥ 0.41 in P1. Both runs take
+//! the same time steps, so that these cause no change. The change at one time may be zero by chance, so the bar of a figure is
 //!
 //! c max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
 //!
@@ -119,7 +119,8 @@ impl Measurement {
         let finer = Finer::new(mesh, &points, LEVELS)?;
         let triangles = finer.mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), finer.mesh.clone())?.restrict(session)?;
-        let fine = FewStepRun::run(session, &problem, solver, triangles, FEW);
+        let times = coarse.times();
+        let fine = FewStepRun::run(session, &problem, solver, triangles, FEW, &times);
         let fine = fine.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         let order = scene.order as usize;
         let stop = match [coarse.stop(), fine.stop()] {

@@ -1,13 +1,6 @@
 //! Progress of the rounds: is it worth to go on?
 
-use super::{
-    AdaptError,
-    measurement::{MeasuredError, Measurement},
-};
-use crate::{
-    memory,
-    petsc::{PetscError, Session},
-};
+use super::measurement::{MeasuredError, Measurement};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Number of measurements between two errors that are compared. With half of it extremes are
@@ -15,12 +8,9 @@ use std::collections::{BTreeMap, BTreeSet};
 const BETWEEN: usize = 2;
 
 /// The errors of the rounds so far, over the errors that the accuracy allows.
-pub(super) struct Progress<'a> {
-    session: &'a Session,
+pub(super) struct Progress {
     accuracy: f64,
-    /// The largest number of triangles of a run so far.
-    most: usize,
-    /// Per round: the triangles and the estimated error.
+    /// Per round whose mesh resolves the data of the scene: the triangles and the estimated error.
     estimates: Vec<(usize, f64)>,
     /// Per measurement: the triangles and the measured errors.
     excesses: Vec<(usize, BTreeMap<String, f64>)>,
@@ -28,21 +18,19 @@ pub(super) struct Progress<'a> {
     grows: BTreeSet<String>,
 }
 
-impl<'a> Progress<'a> {
-    pub(super) fn new(session: &'a Session, accuracy: f64) -> Self {
+impl Progress {
+    pub(super) fn new(accuracy: f64) -> Self {
         let (estimates, excesses, grows) = Default::default();
-        Self { session, accuracy, most: 0, estimates, excesses, grows }
+        Self { accuracy, estimates, excesses, grows }
     }
 
-    /// Adds a round on `triangles` with its estimated error.
-    pub(super) fn estimated(&mut self, triangles: usize, error: f64) {
-        self.most = self.most.max(triangles);
-        self.estimates.push((triangles, error / self.accuracy));
+    /// Adds a round on `triangles` with its estimated error, if its mesh resolves the data.
+    pub(super) fn estimated(&mut self, triangles: usize, error: Option<f64>) {
+        self.estimates.extend(error.map(|error| (triangles, error / self.accuracy)));
     }
 
     /// Adds a measurement of a round on `triangles`. Extremes whose errors stay grow as the mesh is refined.
     pub(super) fn measured(&mut self, triangles: usize, mut measured: Measurement) -> Measurement {
-        self.most = self.most.max(4 * triangles);
         let errors = measured.errors(&[]).into_iter();
         let errors = errors.map(|error| (error.excess(self.accuracy), error.name));
         self.excesses.push((triangles, errors.map(|(excess, name)| (name, excess)).collect()));
@@ -81,7 +69,8 @@ impl<'a> Progress<'a> {
         before.reduce(f64::max).is_some_and(|largest| last > 0.5 * largest)
     }
 
-    /// Whether the estimated error has not become half of what it was with a sixty-fourth of the triangles.
+    /// Whether the estimated error has not become half of what it was with a sixty-fourth of the triangles. A mesh that misses
+    /// data of the scene, such as a peak of a foundation, estimates the error of another problem and does not count.
     fn not_of_the_mesh(&self) -> Option<String> {
         let (triangles, last) = *self.estimates.last().filter(|(_, excess)| *excess > 1.0)?;
         let before = self.estimates.iter().filter(|(count, _)| 64 * count <= triangles);
@@ -90,17 +79,5 @@ impl<'a> Progress<'a> {
             "the estimated error does not fall as the mesh becomes finer: rounding or the time steps cause it"
                 .to_owned()
         })
-    }
-
-    /// Checks that a run on `triangles` fits into the memory. Earlier runs have needed the peak memory of this process,
-    /// and the need grows in proportion. Collective.
-    pub(super) fn check_memory(&self, triangles: usize) -> Result<(), AdaptError> {
-        /// Below this number most memory is that of the libraries.
-        const MANY: usize = 20_000;
-        let comm = self.session.comm();
-        let growth = (triangles as f64 / self.most as f64 - 1.0) * comm.total(memory::peak());
-        let missing = growth - comm.total(memory::available());
-        let missing = if self.most >= MANY { missing } else { 0.0 };
-        Ok(PetscError::if_short(missing, &format!("for a mesh of {triangles} triangles"))?)
     }
 }

@@ -86,10 +86,13 @@ impl<'a> Round<'a> {
         // The errors of figures are products of two estimated errors, see [`Cause::FIGURE`].
         let named = !self.scene.accuracy_of.is_empty();
         let wanted = if named { self.accuracy.sqrt() } else { self.accuracy };
-        self.estimate() <= ENOUGH * wanted
-            && (named || self.open <= ENOUGH)
-            && self.unresolved.is_empty()
-            && self.run.depths().iter().all(|&depth| depth <= self.deepest)
+        self.estimate() <= ENOUGH * wanted && (named || self.open <= ENOUGH) && self.resolves_data()
+    }
+
+    /// Does the mesh resolve the data of the scene? Another mesh may miss a whole peak of a foundation.
+    pub(super) fn resolves_data(&self) -> bool {
+        let is_allowed = |&depth: &f64| depth <= self.deepest;
+        self.unresolved.is_empty() && self.run.depths().iter().all(is_allowed)
     }
 
     /// The interpolation error of the damage at the end, relative, in L².

@@ -6,23 +6,23 @@ use std::mem;
 
 impl ContactStep<'_> {
     /// u_n at `time` for the nodal damage `zeta`, from the solver. If it stops short, its rescuer solves the step,
-    /// and the step's report names it. Every solve starts from the accepted steps.
+    /// and the step's report names it. Every solve starts from the accepted steps; the rescuer's without the
+    /// solver's warm start, which it cannot use.
     ///
     /// # Errors
     /// The solver failed, or neither its answers nor its rescuer's met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let comm = self.problem.body.nodes.partition.comm();
-        let solved = self.solve_by_one(step, time, zeta);
+        let solved = self.solve_by_one(step, time, zeta, true);
         let Err(RunError::Contact { source, .. }) = &solved else { return solved };
         let Some(rescuer) = self.rescuer.as_mut().filter(|_| source.may_be_rescued(comm)) else {
             return solved;
         };
         mem::swap(&mut self.solver, rescuer);
-        // The rescuer cannot use the solver's warm start, and after this failure the solver should not either.
-        self.accepted.warm_start.clear();
-        let rescued = self.solve_by_one(step, time, zeta);
+        let rescued = self.solve_by_one(step, time, zeta, false);
         let name = self.solver.name();
         self.rescuer.iter_mut().for_each(|other| mem::swap(&mut self.solver, other));
+        // Nor can the solver use the rescuer's warm start in the next step.
         self.next.warm_start.clear();
         match rescued {
             // The first error is reported, unless only the rescuer's error states the limit by rounding.

@@ -19,10 +19,12 @@ pub(super) struct ErrorControl<'a> {
     /// T and the times at which steps end besides T, s.
     end: f64,
     times: &'a [f64],
+    /// The times at which the steps of the same run on another mesh ended, s. Steps end there too, whatever their error.
+    followed: &'a [f64],
     /// The loads in time; `None` if they are constant.
     load_curve: Option<LoadCurve<'a>>,
     forecast: Forecast,
-    /// The length of the next step, s.
+    /// The length of the next step, s; infinite if it ends at the next `followed` time.
     next_length: f64,
     /// ζ₀.
     initial: DVector<f64>,
@@ -50,11 +52,15 @@ const MIN_REST: f64 = 1.0 / 16.0;
 
 impl<'a> ErrorControl<'a> {
     /// From ζ₀ = `initial` at t = 0; `None` if the scene has uniform steps.
-    pub(super) fn new(problem: &'a DiscreteProblem, initial: &[f64]) -> Option<Self> {
+    pub(super) fn new(
+        problem: &'a DiscreteProblem,
+        initial: &[f64],
+        followed: &'a [f64],
+    ) -> Option<Self> {
         let grid = problem.scene().time?;
         let Stepping::Auto { tolerance, expected } = grid.stepping else { return None };
         // The error of the first step is at most half of its damage at its last rate, which lasts for the run.
-        let first_length = 2.0 * SHARE * tolerance * grid.end;
+        let first_length = (2.0 * SHARE * tolerance).min(LONGEST) * grid.end;
         let load_curve = LoadCurve::new(problem);
         Some(Self {
             body: &problem.body,
@@ -62,9 +68,10 @@ impl<'a> ErrorControl<'a> {
             expected,
             end: grid.end,
             times: &problem.scene().output.times,
+            followed,
             forecast: Forecast::new(load_curve.as_ref(), grid.end),
             load_curve,
-            next_length: first_length.min(LONGEST * grid.end),
+            next_length: if followed.len() > 1 { f64::INFINITY } else { first_length },
             initial: DVector::from_column_slice(initial),
             damage: [0.0; 2],
         })
@@ -86,8 +93,13 @@ impl<'a> ErrorControl<'a> {
     /// they jump. `None` at the end of the run.
     pub(super) fn next_step(&mut self, start: f64) -> Option<(f64, f64)> {
         let apart = APART * self.end;
-        let is_ahead = |time: &f64| start + apart < *time && *time < self.end - apart;
-        let target = self.times.iter().copied().filter(is_ahead).fold(self.end, f64::min);
+        let is_ahead = |time: &&f64| start + apart < **time && **time < self.end - apart;
+        let followed = self.followed.iter().find(|time| **time > start);
+        if let (Some(&time), f64::INFINITY) = (followed, self.next_length) {
+            return Some((time, time - start));
+        }
+        let times = self.times.iter().filter(is_ahead).chain(followed);
+        let target = times.copied().fold(self.end, f64::min);
         loop {
             let rest = target - start;
             // The last two steps to a target are equal, so that neither is very short.
@@ -150,11 +162,15 @@ impl<'a> ErrorControl<'a> {
             added[j] / (SHARE * (budget - error[j]).max(MIN_REST * budget))
         };
         let ratio = ratio(0).max(ratio(1));
-        if ratio > 1.0 {
+        if ratio > 1.0 && self.next_length < f64::INFINITY {
             return Err(growth(ratio).clamp(0.2, 0.9));
         }
         self.damage = damage;
-        self.next_length = (planned.length * growth(ratio).min(2.0)).min(LONGEST * self.end);
+        let is_followed = |pair: &[f64]| pair[0] == planned.time;
+        self.next_length = match self.followed.windows(2).any(is_followed) {
+            true => f64::INFINITY,
+            false => (planned.length * growth(ratio).min(2.0)).min(LONGEST * self.end),
+        };
         Ok(())
     }
 

@@ -36,7 +36,8 @@ pub(super) enum Decision {
     Stop(Stop),
 }
 
-/// Plans the steps of a run, and accepts or rejects them. Its memory changes only with [`Decision::Accept`].
+/// Plans the steps of a run, and accepts or rejects them. A rejected step changes the length of the next one and nothing else.
+/// The damage system may keep its factor, see `ContactStep::solve_by_one`.
 pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     /// Error control of the damage; `None` for uniform steps.
@@ -87,10 +88,15 @@ const GROWN: f64 = 1.5;
 const OF_EULER: f64 = 2.0;
 
 impl<'a> StepController<'a> {
-    /// After (27), from ζ₀ = `zeta` and its damage source.
-    pub(super) fn new(problem: &'a DiscreteProblem, zeta: &[f64], source: DamageSource) -> Self {
+    /// After (27), from ζ₀ = `zeta` and its damage source. Adaptive steps end at the times `followed`.
+    pub(super) fn new(
+        problem: &'a DiscreteProblem,
+        zeta: &[f64],
+        source: DamageSource,
+        followed: &'a [f64],
+    ) -> Self {
         let zeros = DVector::zeros(zeta.len());
-        let error_control = ErrorControl::new(problem, zeta);
+        let error_control = ErrorControl::new(problem, zeta, followed);
         let memory = StepState {
             length: f64::INFINITY,
             zeta: DVector::from_column_slice(zeta),
