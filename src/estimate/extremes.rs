@@ -1,6 +1,6 @@
 //! Extreme stresses and contact pressures of a state, and the length of contact.
 
-use super::{Measured, NodalStress, principal, stress::Point};
+use super::{Measured, NodalStress, principal, strained, stress::Point};
 use crate::{
     model::von_mises,
     petsc::{Communicator, PetscError},
@@ -157,6 +157,7 @@ impl Extremes {
         measured: &Measured,
     ) -> Result<Self, PetscError> {
         let vertices = &problem.body.vertices.partition;
+        let state = &strained(problem, state);
         let stresses = nodal.stresses(&NodalStress::strained(problem, state), Some(vertices))?;
         let mut extremes = Self::new(problem, state, nodal, &stresses);
         extremes.of_points = extremes.named(&problem.singular_points());

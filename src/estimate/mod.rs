@@ -39,10 +39,11 @@ use crate::{
     },
     fem::RigidMotion,
     petsc::{PetscError, Session},
-    problem::{Bar, DiscreteProblem},
+    problem::{Bar, DiscreteProblem, State},
     scene::{Stepping, TimeGrid},
 };
 use nalgebra::DVector;
+use std::borrow::Cow;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
@@ -117,10 +118,17 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
     let (last, most) = (&outcome.last, outcome.most_displaced());
     let unloaded = last.record.displacement_max < UNLOADED * most.record.displacement_max;
     let state = if unloaded { &most.state } else { &last.state };
-    let [rigid, rest] =
-        RigidMotion::nearest(&problem.body, &state.u).max_norms(&problem.body, &state.u);
-    // The strains of a body that only moves rigidly are rounding.
-    if rest > ROUNDING * rigid { problem.energy_error(&state.zeta, &state.u) } else { Ok(0.0) }
+    problem.energy_error(&state.zeta, &strained(problem, state).u)
+}
+
+/// `state`, without displacements if the body only moves rigidly: its strains are rounding. Collective.
+fn strained<'a>(problem: &DiscreteProblem, state: &'a State) -> Cow<'a, State> {
+    let motion = RigidMotion::nearest(&problem.body, &state.u);
+    let [rigid, rest] = motion.max_norms(&problem.body, &state.u);
+    match rest > ROUNDING * rigid {
+        true => Cow::Borrowed(state),
+        false => Cow::Owned(State { u: vec![0.0; state.u.len()], ..state.clone() }),
+    }
 }
 
 impl Outcome {

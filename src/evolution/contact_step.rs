@@ -35,6 +35,7 @@ use crate::{
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
     petsc::{PetscError, Session, Vector},
+    problem::SHOWN_AS_ZERO,
 };
 use certificate::Candidate;
 use minimisation::displacement;
@@ -77,6 +78,8 @@ struct AcceptedState {
     reference: Reference,
     /// The maximum scales of residuals so far.
     scales: Scales,
+    /// The maximum Σ|f| and Σ|Ku| so far, N per metre of thickness: the scale of resultants.
+    forces: f64,
     /// Per bound: 1 if it is active, else 0.
     active: Vec<f64>,
     /// The solver's warm start, in the solver's own form.
@@ -121,6 +124,7 @@ impl<'a> ContactStep<'a> {
         let memory = AcceptedState {
             reference: Reference::default(),
             scales: Scales { force: MIN_LOAD * problem.largest_load, displacement: 0.0 },
+            forces: 0.0,
             active: vec![0.0; constraints.bounds.len()],
             warm_start: Vec::new(),
         };
@@ -174,9 +178,16 @@ impl<'a> ContactStep<'a> {
         if !is_warm {
             self.next.warm_start.clear();
         }
-        let (Candidate { u, kkt, scales, force, unbalanced, contact, .. }, report) =
-            self.solve_certified(step, &case)?;
+        let (candidate, report) = self.solve_certified(step, &case)?;
+        let Candidate { u, kkt, scales, force, unbalanced, mut contact, .. } = candidate;
         self.next.scales = scales;
+        let forces = self.accepted.forces.max(candidate.forces);
+        self.next.forces = forces;
+        // Contact without force is rounding.
+        let rounding = candidate.rounding.max(SHOWN_AS_ZERO * forces);
+        for point in contact.iter_mut().filter(|point| point.force <= rounding) {
+            (point.active, point.pressure) = (false, 0.0);
+        }
         let limit = problem.tolerance * scales.force;
         self.next.active = active_bounds(&problem.constraints, &contact, limit);
         let unconstrained = self.unconstrained_motion(&contact, force);
@@ -184,14 +195,22 @@ impl<'a> ContactStep<'a> {
         let state = State { time, u, zeta: zeta.to_vec(), contact };
         let (mut record, quantities) = phases.time("step record", || {
             let record = StepRecord::new(problem, step, &state, &case.load, &report, &kkt);
-            (record, problem.quantities_in(&state, &unbalanced))
+            (record, problem.quantities_in(&state, &unbalanced, rounding))
         });
         record.seconds = started.elapsed().as_secs_f64();
         if !(0.0..=MAX_DISPLACEMENT).contains(&record.displacement_max) {
             let source = StepFailure::TooLarge(record.displacement_max);
             return Err(RunError::Step { step, time, source });
         }
-        Ok(Step { state, record, quantities, report, unconstrained, skipped_damage_solve: false })
+        Ok(Step {
+            state,
+            record,
+            quantities,
+            forces,
+            report,
+            unconstrained,
+            skipped_damage_solve: false,
+        })
     }
 
     /// Accepts the step of the last solve, at `time`.

@@ -16,6 +16,8 @@ pub struct Step {
     pub record: StepRecord,
     /// The rest of the row: [`DiscreteProblem::quantities`].
     pub quantities: Vec<f64>,
+    /// The maximum Σ|·| of the loads and the internal forces so far, N per metre of thickness: the scale of resultants.
+    pub forces: f64,
     /// The effort of the contact solve; not in archives.
     #[serde(skip)]
     pub report: ContactReport,

@@ -57,6 +57,26 @@ impl Elasticity {
         })
     }
 
+    /// σ = ζ Aε(u), Pa, in a triangle at barycentric coordinates. It is affine between the quadrature points, which have
+    /// the values `zeta` of ζ.
+    pub fn stress_at(
+        &self,
+        body: &Body,
+        (t, at): (usize, [f64; 3]),
+        zeta: &[f64],
+        u: &[f64],
+    ) -> Vector3<f64> {
+        for_elements!(body, cells => {
+            let (local, points) = (cells.gather(t, u), &cells.elements[t].points);
+            let zeta = &zeta[points.len() * t..];
+            // An affine f has the values f(x_q) = Σ f(corner)/6 + f(corner q)/2.
+            let weight = |q: usize| if points.len() == 1 { 1.0 } else { 2.0 * at[q] - 1.0 / 3.0 };
+            let strains = points.iter().zip(zeta).enumerate();
+            let strains = strains.map(|(q, (point, zeta))| point.strain(&local) * (weight(q) * zeta));
+            self.d(body, t) * strains.sum::<Vector3<f64>>()
+        })
+    }
+
     /// The strain energies (twice) w ζ Aε(u) : ε(u) at the quadrature points, N m per metre of thickness.
     pub fn energies(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
         for_elements!(body, cells => {

@@ -114,16 +114,15 @@ fn weighted<const N: usize>(points: &[[f64; 2]; N], values: &[f64; N]) -> [f64; 
     [0, 1].map(|k| points.iter().zip(values).map(|(x, value)| value * x[k]).sum())
 }
 
-/// Adds the surface load f_i = ∫ f_N·φ_i over `parts` of boundary edges, from and to an s each, to the nodal
-/// loads, with f_N in N/m² as a function of the point and the outward normal there. Three Gauss points a part
+/// Adds the surface load f_i = ∫ f_N·φ_i over `parts` of boundary edges between `points`, from and to an s each, to the
+/// nodal loads, with f_N in N/m² as a function of the point and the outward normal there. Three Gauss points a part
 /// are exact, on straight edges, where f_N is a polynomial of degree 4 for P1 and 3 for P2.
 pub fn add_traction(
-    body: &Body,
+    points: &[[f64; 2]],
     parts: impl IntoIterator<Item = (Edge, [f64; 2])>,
     traction: impl Fn([f64; 2], [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
-    let points = &body.nodes.points;
     for (edge, [from, to]) in parts {
         for [s, share] in THREE_GAUSS {
             let s = from + s * (to - from);

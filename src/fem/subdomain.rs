@@ -153,7 +153,12 @@ impl Subdomain {
 
     /// The local index of a triangle, if it belongs to the rank.
     pub fn own_triangle(&self, triangle: usize) -> Option<usize> {
-        self.triangles[..self.own_triangles].iter().position(|&own| own == triangle)
+        self.triangle(triangle).filter(|&local| local < self.own_triangles)
+    }
+
+    /// The local index of a triangle, if the rank keeps it.
+    pub fn triangle(&self, triangle: usize) -> Option<usize> {
+        self.triangles.iter().position(|&kept| kept == triangle)
     }
 
     /// The local part of a nodal field like u of the undivided body with `block` components.

@@ -14,8 +14,8 @@ const CONTACT: [&str; 2] = ["pressure_max", "contact_length"];
 /// The groups of the supports' forces and moments.
 const FORCES: &str = "forces";
 const MOMENTS: &str = "moments";
-/// The scale of a figure is at least this fraction of the largest figure of its dimension. Otherwise a force that
-/// is zero by symmetry would have no relative error.
+/// The scale of a figure is at least this fraction of the natural scale of its dimension: of the energy ‖u‖² for a work,
+/// of max |u| for a length, and of Σ|f| for a force. Otherwise a force that is zero by symmetry would have no relative error.
 const MIN_SCALE: f64 = 1e-3;
 /// The scale of a moment is at least this fraction of the maximum force times the body's radius of gyration: a moment is
 /// small about any point near the line of its force. The scale of a stress is at least this fraction of the mean stress
@@ -29,8 +29,9 @@ const UNIFORM: f64 = 2.5;
 /// A damage below this is negligible.
 pub(crate) const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
-/// A quantity below this fraction of the largest of its group is rounding, and shown as zero.
-const SHOWN_AS_ZERO: f64 = 1e-9;
+/// A quantity below this fraction of the natural scale of its dimension is rounding, and shown as zero. Forces are compared
+/// with Σ|f|, and so are the reactions of contact.
+pub(crate) const SHOWN_AS_ZERO: f64 = 1e-9;
 
 /// The dimension of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -133,9 +134,10 @@ impl DiscreteProblem {
         self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
     }
 
-    /// The scale of each figure, from the `largest` [sizes](Self::figure_sizes) and the largest ‖u‖² (`energy`, N m per
-    /// metre of thickness) of a run: the maximum of its group.
-    pub(crate) fn figure_scales(&self, largest: &[f64], energy: f64) -> Vec<f64> {
+    /// The scale of each figure: the maximum of its group in a run, and at least a part of its natural scale. From the
+    /// `largest` [sizes](Self::figure_sizes), ‖u‖² (`energy`, N m per metre of thickness) and Σ|f| (`forces`, N per metre
+    /// of thickness) of the run. All forces may balance, as in pure bending; their sum of moduli does not vanish.
+    pub(crate) fn figure_scales(&self, largest: &[f64], energy: f64, forces: f64) -> Vec<f64> {
         let figures = self.figures();
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
             let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
@@ -146,35 +148,44 @@ impl DiscreteProblem {
         let mean_stress = (young.fold(f64::INFINITY, f64::min) * energy / self.body.area).sqrt();
         let scale = |figure: &Figure| {
             let own = most(&|other| other.group == figure.group);
-            let alike = match figure.dimension {
-                Dimension::Damage => return own.max(NEGLIGIBLE_DAMAGE),
-                Dimension::Moment => {
-                    MIN_PART * lever * most(&|other| other.dimension == Dimension::Force)
+            let least = match figure.dimension {
+                Dimension::Work => MIN_SCALE * energy,
+                Dimension::Length => {
+                    MIN_SCALE * most(&|other| other.dimension == Dimension::Length)
                 }
+                Dimension::Force => MIN_SCALE * forces,
+                Dimension::Moment => {
+                    let resultant = most(&|other| other.dimension == Dimension::Force);
+                    lever * (MIN_PART * resultant).max(MIN_SCALE * forces)
+                }
+                Dimension::Damage => NEGLIGIBLE_DAMAGE,
                 Dimension::Stress => MIN_PART * mean_stress,
-                dimension => MIN_SCALE * most(&|other| other.dimension == dimension),
+                // A sum of lengths of edges has no rounding.
+                Dimension::ContactLength => 0.0,
             };
-            own.max(alike)
+            own.max(least)
         };
         figures.iter().map(scale).collect()
     }
 
-    /// The values of [`Self::quantities`] with zeros in place of rounding. A value is compared with the largest of
-    /// its group, and a moment also with the maximum force times the body's radius of gyration.
-    pub(crate) fn without_rounding(&self, mut values: Vec<f64>) -> Vec<f64> {
+    /// The values of [`Self::quantities`] with zeros in place of rounding, which is in a force at most `force`, N per metre
+    /// of thickness, and in a displacement at most `displacement`, m. With the body's radius of gyration r it is in a
+    /// moment r times the force, and in a stress the force over r.
+    pub(crate) fn without_rounding(
+        &self,
+        mut values: Vec<f64>,
+        (force, displacement): (f64, f64),
+    ) -> Vec<f64> {
         let figures = &self.figures()[OF_RECORD.len()..];
-        let most = |group: &str| {
-            let alike = figures.iter().zip(&values).filter(|(figure, _)| figure.group == group);
-            alike.fold(0.0_f64, |most, (_, value)| most.max(value.abs()))
-        };
         let lever = self.body.radius_of_gyration();
-        let rounding = figures.iter().map(|figure| match figure.dimension {
-            Dimension::Damage => 0.0,
-            Dimension::Moment => SHOWN_AS_ZERO * most(MOMENTS).max(lever * most(FORCES)),
-            _ => SHOWN_AS_ZERO * most(&figure.group),
-        });
-        let rounding: Vec<f64> = rounding.collect();
-        for (value, rounding) in values.iter_mut().zip(rounding) {
+        for (value, figure) in values.iter_mut().zip(figures) {
+            let rounding = match figure.dimension {
+                Dimension::Length => displacement,
+                Dimension::Force => force,
+                Dimension::Moment => lever * force,
+                Dimension::Stress => force / lever,
+                _ => 0.0,
+            };
             // No -0.
             *value = if value.abs() <= rounding { 0.0 } else { *value + 0.0 };
         }

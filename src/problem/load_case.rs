@@ -49,7 +49,8 @@ impl DiscreteProblem {
             return Err(self.not_finite(time));
         }
         let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
-        self.motions.check(&self.body, &load).map_err(driven)?;
+        let error = || self.loads.resultant_error(&self.body, time);
+        self.motions.check(&self.body, &load, error).map_err(driven)?;
         Ok(load)
     }
 

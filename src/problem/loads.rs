@@ -105,6 +105,15 @@ impl Loads {
         self.constant.clone().unwrap_or_else(|| self.assemble(body, t))
     }
 
+    /// The estimated errors of the resultant at time t: of (F_x, F_y) and the moment about the centroid by the shape of the
+    /// edges, N and N m per metre of thickness; and by the quadrature, relative to Σ|f|.
+    pub(super) fn resultant_error(&self, body: &Body, t: f64) -> ([f64; 3], f64) {
+        let errors = self.surface_forces.iter().map(|f| f.resultant_error(body.centroid, t));
+        let sum = errors.fold([0.0; 3], |sum, error| [0, 1, 2].map(|k| sum[k] + error[k]));
+        let missed = self.surface_forces.iter().map(|force| force.missed(t));
+        (sum, missed.chain(self.body_force.iter().map(|force| force.missed)).fold(0.0, f64::max))
+    }
+
     /// The values of all rows at time t, m: prescribed displacements u·d, and gaps.
     pub fn values_at(&self, t: f64) -> Vec<f64> {
         self.values.iter().map(|value| value.at(t)).collect()

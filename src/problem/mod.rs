@@ -31,7 +31,7 @@ pub(crate) use contact_figures::{peak, rows_of};
 pub use contact_line::{ContactLine, ContactRow};
 pub use error::SetupError;
 pub use figures::{Bar, Dimension};
-pub(crate) use figures::{NEGLIGIBLE_DAMAGE, whole_and_parts};
+pub(crate) use figures::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO, whole_and_parts};
 pub(crate) use load_case::LoadCase;
 pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
@@ -198,13 +198,25 @@ impl DiscreteProblem {
         [columns(&self.supports.names, &resultants), columns(&probes, &OBSERVED)].concat()
     }
 
-    /// The values of [`Self::quantities`] in a state with the residual forces `unbalanced` = f − Ku. Collective.
-    pub(crate) fn quantities_in(&self, state: &State, unbalanced: &[f64]) -> Vec<f64> {
-        let mut values =
-            self.supports.resultants(&self.body, unbalanced, (&state.contact, state.time));
+    /// The values of [`Self::quantities`] in a state with the residual forces `unbalanced` = f − Ku. Forces up to
+    /// `rounding`, N per metre of thickness, are zero. Collective.
+    pub(crate) fn quantities_in(
+        &self,
+        state: &State,
+        unbalanced: &[f64],
+        rounding: f64,
+    ) -> Vec<f64> {
+        let zeta = self.zeta_at_points(&state.zeta);
+        let stress = |t: usize, at: [f64; 3]| {
+            self.elasticity.stress_at(&self.body, (t, at), &zeta, &state.u)
+        };
+        let contact = (&state.contact[..], state.time);
+        let mut values = self.supports.resultants(&self.body, unbalanced, contact, stress);
         values.extend(self.probes.values(self, state));
-        self.body.nodes.partition.comm().sum(&mut values);
-        self.without_rounding(values)
+        let partition = &self.body.nodes.partition;
+        partition.comm().sum(&mut values);
+        let displacement = SHOWN_AS_ZERO * partition.max_norm(&state.u);
+        self.without_rounding(values, (rounding, displacement))
     }
 
     /// η_*(ζ).

@@ -3,24 +3,37 @@
 use super::{ContactLine, boundary_conditions::BoundaryConditions};
 use crate::{
     contact::ContactPoint,
-    fem::{Body, Subdomain},
+    fem::{Body, Edge, Subdomain},
+    mesh::{Face, sorted},
     scene::{Boundary, Scene},
 };
-use std::collections::BTreeMap;
+use nalgebra::{Matrix2, Vector2, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The boundaries with prescribed displacements or a gap, and the nodes of this rank on them.
 #[derive(Debug, Clone, Default)]
 pub struct Supports {
     /// Their names, in the order of the scene.
     pub names: Vec<String>,
-    /// Per node with a prescribed displacement: its prescribed directions.
-    prescribed: BTreeMap<usize, Vec<Prescribed>>,
+    /// Per node with a prescribed displacement: its prescribed directions, with the number of the boundary.
+    prescribed: BTreeMap<usize, Vec<(usize, [f64; 2])>>,
+    /// Per node at which several boundaries prescribe the displacement: their edges there.
+    edges: BTreeMap<usize, Vec<NodeEdge>>,
     /// Γ_C.
     pub contact: ContactLine,
 }
 
-/// A force on the body, or a direction in which its displacement is prescribed, with the number of the boundary.
-type Prescribed = (usize, [f64; 2]);
+/// An edge of a boundary at one of its nodes i.
+#[derive(Debug, Clone)]
+struct NodeEdge {
+    /// The number of the boundary.
+    boundary: usize,
+    /// The triangle of the edge, and the node's barycentric coordinates in it.
+    triangle: usize,
+    at: [f64; 3],
+    /// ν and ∫φ_i.
+    face: Face,
+}
 
 impl Supports {
     /// The supports of `scene` on the undivided `body`, with its `conditions`.
@@ -29,23 +42,45 @@ impl Supports {
         for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
             supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
         }
+        let several = |of: &[(usize, [f64; 2])]| of.iter().any(|(number, _)| *number != of[0].0);
+        let shared = supports.prescribed.iter().filter(|(_, of)| several(of));
+        let shared: BTreeSet<usize> = shared.map(|(node, _)| *node).collect();
+        let triangles = triangles_at(body, &shared);
         for boundary @ Boundary { name, .. } in &scene.boundaries {
             let number = supports.names.iter().position(|other| other == name);
             let curve = body.mesh.curves.get(name);
-            if let (Some(gap), Some(number), Some(curve)) = (boundary.gap(), number, curve) {
-                let edges = body.edges(&curve.edges);
+            let (Some(number), Some(curve)) = (number, curve) else { continue };
+            let edges = body.edges(&curve.edges);
+            if let Some(gap) = boundary.gap() {
                 supports.contact.add((number, name), gap, &body.nodes.points, &edges);
             }
+            for edge in &edges {
+                let Some(&triangle) = triangles.get(&sorted(edge.ends)) else { continue };
+                for (node, face) in edge.faces(&body.nodes.points) {
+                    let at = coordinates(&body.mesh.triangles[triangle], edge, node);
+                    let of_node = NodeEdge { boundary: number, triangle, at, face };
+                    supports.edges.entry(node).or_default().push(of_node);
+                }
+            }
         }
+        supports.edges.retain(|node, _| shared.contains(node));
         supports
     }
 
     pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
         let own = |node: &usize| subdomain.owned(*node);
         let prescribed = self.prescribed.iter();
+        // A rank keeps all triangles around its own nodes.
+        let local = |edge: &NodeEdge| {
+            Some(NodeEdge { triangle: subdomain.triangle(edge.triangle)?, ..edge.clone() })
+        };
+        let edges = self.edges.iter();
+        let edges =
+            edges.filter_map(|(n, of)| Some((own(n)?, of.iter().filter_map(local).collect())));
         Self {
             names: self.names.clone(),
             prescribed: prescribed.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
+            edges: edges.collect(),
             contact: self.contact.restrict(own),
         }
     }
@@ -54,12 +89,14 @@ impl Supports {
     /// about the origin, positive anticlockwise, N.
     ///
     /// R_i = (Ku − f)_i is the force on the body at node i; `unbalanced` is f − Ku. At a prescribed node with a
-    /// closed gap, the obstacle exerts the normal reaction and the other boundaries exert the rest.
+    /// closed gap, the obstacle exerts the normal reaction and the other boundaries exert the rest. `stress` is σ in a
+    /// triangle at barycentric coordinates, Pa.
     pub(super) fn resultants(
         &self,
         body: &Body,
         unbalanced: &[f64],
         (contact, t): (&[ContactPoint], f64),
+        stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
     ) -> Vec<f64> {
         let mut sums = vec![0.0; 3 * self.names.len()];
         let mut add = |boundary: usize, node: usize, [fx, fy]: [f64; 2]| {
@@ -82,27 +119,74 @@ impl Supports {
             }
         }
         for (node, force) in rest {
-            let parts = parts(&self.prescribed[&node], force);
-            parts.into_iter().for_each(|(boundary, part)| add(boundary, node, part));
+            let exerted = self.divided(node, force.into(), &stress);
+            exerted.into_iter().for_each(|(boundary, force)| add(boundary, node, force.into()));
         }
         sums
     }
+
+    /// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement.
+    ///
+    /// The tractions of a boundary B on its edges there have the part R_B = P_B ∫φ σν, with the projection P_B on the
+    /// directions that it prescribes. Its length ℓ_B = ∫φ takes a share in the rest: B exerts R_B + ℓ_B P_B λ, where
+    /// (Σ ℓ_B P_B) λ = F − Σ R_B.
+    fn divided(
+        &self,
+        node: usize,
+        force: Vector2<f64>,
+        stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
+    ) -> Vec<(usize, Vector2<f64>)> {
+        let prescribed = &self.prescribed[&node];
+        let Some(edges) = self.edges.get(&node) else { return vec![(prescribed[0].0, force)] };
+        let numbers: BTreeSet<usize> = prescribed.iter().map(|(number, _)| *number).collect();
+        let part = |number: usize| {
+            let own = edges.iter().filter(|edge| edge.boundary == number);
+            let traction = own.clone().map(|NodeEdge { triangle, at, face, .. }| {
+                let [xx, yy, xy] = stress(*triangle, *at).into();
+                Matrix2::new(xx, xy, xy, yy) * Vector2::from(face.normal) * face.length
+            });
+            let length: f64 = own.map(|edge| edge.face.length).sum();
+            let directions = prescribed.iter().filter(|(other, _)| *other == number);
+            let onto = projection(directions.map(|(_, direction)| Vector2::from(*direction)));
+            (number, onto * traction.sum::<Vector2<f64>>(), length * onto)
+        };
+        let parts: Vec<_> = numbers.into_iter().map(part).collect();
+        let weights: Matrix2<f64> = parts.iter().map(|(.., weight)| weight).sum();
+        let rest = force - parts.iter().map(|(_, own, _)| own).sum::<Vector2<f64>>();
+        let inverse = weights.pseudo_inverse(SINE * SINE * weights.trace());
+        let rest = inverse.expect("a positive tolerance") * rest;
+        let exerted = parts.iter().map(|(number, own, weight)| (*number, own + weight * rest));
+        let mut exerted: Vec<_> = exerted.collect();
+        // Rounding across all directions.
+        let all = exerted.iter().map(|(_, own)| own).sum::<Vector2<f64>>();
+        exerted[0].1 += force - all;
+        exerted
+    }
 }
 
-/// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement. If two directions d and
-/// e are prescribed, their boundaries exert αd and βe with F = αd + βe; a boundary that prescribes both exerts F.
-/// Otherwise one exerts F.
-fn parts(prescribed: &[Prescribed], force: [f64; 2]) -> Vec<Prescribed> {
-    /// Directions are parallel if the sine of the angle between them is at most this.
-    const SINE: f64 = 1e-6;
-    let cross = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a * d - b * c;
-    let pairs = prescribed.iter().flat_map(|a| prescribed.iter().map(move |b| (*a, *b)));
-    let mut pairs = pairs.filter(|((_, d), (_, e))| cross(*d, *e).abs() > SINE);
-    match pairs.clone().find(|(a, b)| a.0 == b.0).or_else(|| pairs.next()) {
-        None => vec![(prescribed[0].0, force)],
-        Some(((first, d), (other, e))) => {
-            let (along_d, along_e) = (cross(force, e) / cross(d, e), cross(d, force) / cross(d, e));
-            vec![(first, d.map(|d| along_d * d)), (other, e.map(|e| along_e * e))]
-        }
-    }
+/// Directions are parallel if the sine of the angle between them is at most this.
+const SINE: f64 = 1e-6;
+
+/// The projection on the span of unit vectors.
+fn projection(directions: impl Iterator<Item = Vector2<f64>> + Clone) -> Matrix2<f64> {
+    let first = directions.clone().next().unwrap_or_default();
+    let is_plane = directions.map(|other| first.perp(&other).abs()).any(|sine| sine > SINE);
+    if is_plane { Matrix2::identity() } else { first * first.transpose() }
+}
+
+/// The triangle at each edge with an end in `nodes`, by the sorted ends of the edge.
+fn triangles_at(body: &Body, nodes: &BTreeSet<usize>) -> BTreeMap<[usize; 2], usize> {
+    let sides = |(triangle, [a, b, c]): (usize, &[usize; 3])| {
+        [[*a, *b], [*b, *c], [*c, *a]].map(|side| (sorted(side), triangle))
+    };
+    let sides = body.mesh.triangles.iter().enumerate().flat_map(sides);
+    sides.filter(|(side, _)| side.iter().any(|node| nodes.contains(node))).collect()
+}
+
+/// The barycentric coordinates of a node of an edge in a triangle.
+fn coordinates(triangle: &[usize; 3], edge: &Edge, node: usize) -> [f64; 3] {
+    triangle.map(|vertex| match edge.middle == Some(node) && edge.ends.contains(&vertex) {
+        true => 0.5,
+        false => f64::from(u8::from(vertex == node)),
+    })
 }

@@ -45,7 +45,12 @@ fn quadratic_tractions_and_affine_body_forces_are_integrated_exactly() {
         // On the top, y = 1: f = (1 − 2x + 6x², 3x²). ∫f_x = 1 − 1 + 2, ∫x f_x = 1/2 − 2/3 + 6/4; ∫f_y = 1, ∫x f_y = 3/4.
         let mut load = zero.clone();
         let f = |[x, _]: [f64; 2], _| [1.0 - 2.0 * x + 6.0 * x * x, 3.0 * x * x];
-        add_traction(&body, whole(&body, &body.mesh.curves["top"].edges), f, &mut load);
+        add_traction(
+            &body.nodes.points,
+            whole(&body, &body.mesh.curves["top"].edges),
+            f,
+            &mut load,
+        );
         check(&load, [[2.0, 4.0 / 3.0, 2.0], [1.0, 0.75, 1.0]]);
         // f = (2 − x + 3y, 6y) on the square. ∫xy = 1/4, ∫x² = 1/3.
         let mut load = zero;
@@ -66,7 +71,12 @@ fn a_pressure_all_around_has_no_resultant() {
         let mut load = vec![0.0; 2 * body.nodes.points.len()];
         for curve in body.mesh.curves.values() {
             for edge in &curve.edges {
-                add_traction(&body, whole(&body, &[*edge]), |_, normal| normal, &mut load);
+                add_traction(
+                    &body.nodes.points,
+                    whole(&body, &[*edge]),
+                    |_, normal| normal,
+                    &mut load,
+                );
             }
         }
         let [[x, _, moment_x], [y, moment_y, _]] = moments(&body, &load);
@@ -82,7 +92,7 @@ fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
     let body = Body::new(curved(), Order::Quadratic);
     for curve in body.mesh.curves.values() {
         let mut load = vec![0.0; 2 * body.nodes.points.len()];
-        add_traction(&body, whole(&body, &curve.edges), |_, normal| normal, &mut load);
+        add_traction(&body.nodes.points, whole(&body, &curve.edges), |_, normal| normal, &mut load);
         let ends = curve.edges.iter().map(|edge| edge.map(|node| body.mesh.nodes[node]));
         let square = |[x, y]: [f64; 2]| x * x + y * y;
         let mut expected = [0.0; 3];
@@ -118,7 +128,7 @@ fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
         let traction = |_, [nx, ny]: [f64; 2]| {
             [stress[0] * nx + stress[2] * ny, stress[2] * nx + stress[1] * ny]
         };
-        add_traction(&body, whole(&body, &curve.edges), traction, &mut load);
+        add_traction(&body.nodes.points, whole(&body, &curve.edges), traction, &mut load);
     }
     let error = difference(&load, &force);
     assert!(error < 1e-13, "{error}");

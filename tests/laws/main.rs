@@ -38,6 +38,7 @@ mod recovery;
 mod punch;
 mod regression;
 mod rescue;
+mod resultants;
 mod rigid;
 mod scales;
 mod shipped_scenes;

@@ -9,6 +9,8 @@ use nalgebra::DVector;
 
 /// Relative to Σ|f|: work of a load on a motion without support up to this is rounding.
 const BALANCED: f64 = 1e-8;
+/// The error of a load's resultant is at most this many times its estimate: the curve through coarse edges is not exact.
+const OVER_ESTIMATE: f64 = 2.0;
 
 /// The load does work on a rigid motion without support.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -28,14 +30,20 @@ pub struct DrivenMotion {
 }
 
 impl RigidMotions {
-    /// Checks two conditions on `load` (nodal forces, N). It does no work on free motions, within the
-    /// accuracy of the normals of the mesh. Contact forces can balance it on the resisted motions: min ‖Nᵀp −
-    /// w‖ over p ≥ 0 is 0, with u·ν of the motions in N and the work on them in w. Otherwise the remainder is
-    /// a motion that the load drives and contact allows (lemma of Farkas). Collective.
+    /// Checks two conditions on `load` (nodal forces, N). It does no work on free motions, within the accuracy of the
+    /// normals of the mesh and of the load: `error` is the estimated error of its resultant, and another one relative to
+    /// Σ|f|. Contact forces can balance it on the resisted motions: min ‖Nᵀp − w‖ over p ≥ 0 is 0, with u·ν of the
+    /// motions in N and the work on them in w. Otherwise the remainder is a motion that the load drives and contact
+    /// allows (lemma of Farkas). Collective.
     ///
     /// # Errors
     /// The load drives a motion; the error names it.
-    pub fn check(&self, body: &Body, load: &[f64]) -> Result<(), DrivenMotion> {
+    pub fn check(
+        &self,
+        body: &Body,
+        load: &[f64],
+        error: impl Fn() -> ([f64; 3], f64),
+    ) -> Result<(), DrivenMotion> {
         if self.all_prevented() {
             return Ok(());
         }
@@ -49,9 +57,13 @@ impl RigidMotions {
             let force = [fx, fy].map(|f| if f.abs() > ROUNDING * total { f } else { 0.0 });
             Err(DrivenMotion { motion, force, moment })
         };
-        for (motion, error) in self.free.iter().zip(&self.free_errors) {
-            if motion.work(sums).abs() > (BALANCED + error) * total {
-                return driven(*motion);
+        for (motion, of_normals) in self.free.iter().zip(&self.free_errors) {
+            let work = motion.work(sums).abs() - (BALANCED + of_normals) * total;
+            if work > 0.0 {
+                let (of_load, relative) = error();
+                if work > OVER_ESTIMATE * motion.work(of_load).abs() + relative * total {
+                    return driven(*motion);
+                }
             }
         }
         let work = self.work(body, |i| forces[i]);

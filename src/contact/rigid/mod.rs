@@ -158,7 +158,7 @@ impl RigidMotions {
     }
 
     /// `load` (nodal forces, N) minus the body force that does the same work on free motions. If
-    /// [`Self::check`] accepts the load, this work is rounding; without it the pins carry no force.
+    /// [`Self::check`] accepts the load, this work is the error of its integration; without it the pins carry no force.
     pub fn balanced(&self, body: &Body, mut load: Vec<f64>) -> Vec<f64> {
         if !self.free.is_empty() {
             let balance = self.projection(body, |i| [load[2 * i], load[2 * i + 1]]).field(body);

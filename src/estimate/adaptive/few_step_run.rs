@@ -3,7 +3,7 @@
 use crate::{
     estimate::{
         Extremes, NodalStress, RecoveredStrains, UNLOADED,
-        damage_interpolation::interpolation_shares,
+        damage_interpolation::interpolation_shares, strained,
     },
     evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
@@ -38,8 +38,9 @@ struct History {
     /// max_t ‖ε* − ε(u)‖²_T, and the maximum sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
-    /// max_t ‖u‖², and the maximum |u| at any time, m.
+    /// max_t ‖u‖², the maximum Σ|·| of forces, N per metre of thickness, and the maximum |u| at any time, m.
     energy: f64,
+    forces: f64,
     displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
@@ -108,14 +109,14 @@ impl<'a> FewStepRun<'a> {
 
     /// The scales of the figures. An extreme that `grows` is no scale of the others.
     pub(super) fn scales(&self, grows: &[String]) -> Vec<f64> {
-        let History { sizes, sizes_of_extremes, energy, .. } = &self.history;
+        let History { sizes, sizes_of_extremes, energy, forces, .. } = &self.history;
         let names = self.problem.extremes();
         let of_extremes = names
             .iter()
             .zip(sizes_of_extremes)
             .map(|(name, &size)| if grows.iter().any(|grown| grown == name) { 0.0 } else { size });
         let sizes = Vec::from_iter(sizes.iter().copied().chain(of_extremes));
-        self.problem.figure_scales(&sizes, *energy)
+        self.problem.figure_scales(&sizes, *energy, *forces)
     }
 
     /// The times at which steps end, s.
@@ -215,6 +216,7 @@ impl History {
             squares: vec![0.0; triangles],
             worst: 0.0,
             energy: 0.0,
+            forces: 0.0,
             displacement: 0.0,
             end: Default::default(),
             depths: vec![0.0; triangles],
@@ -228,6 +230,7 @@ impl History {
     fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
         let time = step.state.time;
         let figures = step.figures();
+        self.forces = step.forces;
         enlarge(&mut self.sizes, problem.figure_sizes(&figures));
         self.figures.push((time, figures));
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
@@ -249,6 +252,7 @@ impl History {
             *deepest = deepest.max(penetration.depth);
         }
         let zeta = problem.zeta_at_points(&state.zeta);
+        let state = &strained(problem, state);
         let strained = NodalStress::strained(problem, state);
         let recovered = RecoveredStrains::on(&self.stress.patches, body, strained.strains)?;
         let stresses = self.stress.by_fits(&recovered.fits, &strained.zeta);

@@ -22,6 +22,11 @@ pub(super) struct Candidate {
     pub(super) scales: Scales,
     /// The larger of ‖f‖₂ and ‖Ku‖₂, N per metre of thickness.
     pub(super) force: f64,
+    /// The larger of Σ|f| and Σ|Ku| over all components, N per metre of thickness: the scale of resultants. It does not
+    /// depend on the mesh, and does not vanish where forces balance.
+    pub(super) forces: f64,
+    /// Forces up to this are rounding, N per metre of thickness: Σ|Ku| if the body only moves rigidly, without load.
+    pub(super) rounding: f64,
     /// The cosine between u and its elastic forces: the sign of the energy.
     energy: f64,
     /// f − Ku, N per metre of thickness.
@@ -48,18 +53,19 @@ impl ContactStep<'_> {
         let rigid = RigidMotion::nearest(body, &u);
         let [rigid_max, elastic_max] = rigid.max_norms(body, &u);
         let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
-        // |f|², |Ku|², u·Ku and |u|².
-        let mut sums = [0.0; 4];
+        // |f|², |Ku|², u·Ku, |u|², Σ|f| and Σ|Ku|.
+        let mut sums = [0.0; 6];
         let nodal = unbalanced.iter_mut().zip(&case.load).zip(&u);
         for ((r, f), u) in nodal.take(2 * partition.owned()) {
-            sums[0] += f * f;
-            sums[1] += *r * *r;
-            sums[2] += u * *r;
-            sums[3] += u * u;
+            let terms = [f * f, *r * *r, u * *r, u * u, f.abs(), r.abs()];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
             *r = f - *r;
         }
         partition.comm().sum(&mut sums);
         let force = sums[0].max(sums[1]).sqrt();
+        let [.., load, internal] = sums;
+        let is_rigid = elastic_max <= self.reference_rounding().max(ROUNDING * rigid_max);
+        let rounding = if is_rigid && load == 0.0 { internal } else { 0.0 };
         let scales = self.run_scales(Scales { force, displacement: elastic_max });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer = Answer {
@@ -79,6 +85,8 @@ impl ContactStep<'_> {
             kkt,
             scales,
             force,
+            forces: load.max(internal - rounding),
+            rounding,
             energy,
             unbalanced,
             contact,
@@ -91,14 +99,19 @@ impl ContactStep<'_> {
     /// The scales of an answer, at least the scales of the run so far. They include the rounding of the reference
     /// motion, the only scale of a rigid body. The displacement scale is at least force scale / stiffness.
     pub(super) fn run_scales(&self, answer: Scales) -> Scales {
-        let (reference, run) = (&self.next.reference, self.accepted.scales);
-        let rounding = match reference.is_zero() {
-            true => 0.0,
-            false => ROUNDING * self.problem.body.nodes.partition.max_norm(&reference.field),
-        };
+        let (run, rounding) = (self.accepted.scales, self.reference_rounding());
         let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
         let min = rounding.max(force / self.stiffness.scale);
         Scales { force, displacement: answer.displacement.max(run.displacement).max(min) }
+    }
+
+    /// The rounding of the reference motion, m. Collective.
+    fn reference_rounding(&self) -> f64 {
+        let reference = &self.next.reference;
+        match reference.is_zero() {
+            true => 0.0,
+            false => ROUNDING * self.problem.body.nodes.partition.max_norm(&reference.field),
+        }
     }
 
     /// Adds to an error the tolerance that double precision can reach, if this explains the error.

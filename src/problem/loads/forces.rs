@@ -5,9 +5,12 @@ use super::parts::{
 };
 use crate::{
     fem::{Body, Edge, GAUSS, Subdomain, TriangleParts, add_body_force, add_traction, parabola},
+    mesh::Face,
     problem::boundary_conditions::Traction,
     scene::{Expression, Scene, SurfaceLoad},
 };
+use nalgebra::Vector2;
+use std::collections::BTreeMap;
 
 /// Allowed errors of resultants relative to ∫|f|: for assembled surface loads …
 const DEVIATION: f64 = 1e-6;
@@ -26,6 +29,8 @@ pub(super) struct SurfaceForce {
     force: SurfaceLoad,
     /// Its edges in the undivided body: ends and middles, m. All ranks divide them in the same way.
     lines: Vec<[[f64; 2]; 3]>,
+    /// The halves of the same edges as parts of a smooth curve.
+    smooth: Vec<[[f64; 2]; 3]>,
     /// The same edges on this rank; `None` for edges of other ranks.
     edges: Vec<Option<Edge>>,
     /// The samples of a load that does not depend on time.
@@ -37,8 +42,9 @@ impl SurfaceForce {
         let points = &body.nodes.points;
         let line = |edge: &Edge| [0.0, 0.5, 1.0].map(|s| edge.at(points, s));
         let lines = edges.iter().map(line).collect();
+        let smooth = smooth_halves(&edges, points);
         let edges = edges.into_iter().map(Some).collect();
-        let mut new = Self { force, lines, edges, constant: None };
+        let mut new = Self { force, lines, smooth, edges, constant: None };
         if !new.expressions().any(Expression::depends_on_time) {
             let mut samples = Vec::new();
             new.sample(0.0, &mut samples);
@@ -69,7 +75,26 @@ impl SurfaceForce {
     pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
         let parts = self.parts(t, DEVIATION).parts;
         let parts = parts.into_iter().filter_map(|(edge, part)| Some((self.edges[edge]?, part)));
-        add_traction(body, parts, |x, normal| self.force.at(x, normal, t), load);
+        add_traction(&body.nodes.points, parts, |x, normal| self.force.at(x, normal, t), load);
+    }
+
+    /// The estimated error of the resultant (F_x, F_y) and the moment about `centre` at time t by the shape of the edges:
+    /// their change from the edges to the halves of the smooth curve.
+    pub(super) fn resultant_error(&self, centre: [f64; 2], t: f64) -> [f64; 3] {
+        let [edges, smooth] = [&self.lines, &self.smooth].map(|l| self.resultant(l, centre, t));
+        [0, 1, 2].map(|k| smooth[k] - edges[k])
+    }
+
+    fn resultant(&self, lines: &[[[f64; 2]; 3]], [cx, cy]: [f64; 2], t: f64) -> [f64; 3] {
+        let parts = edge_parts(lines, self.force.expressions(), t, DEVIATION).parts.into_iter();
+        let edge = |edge| Edge { ends: [3 * edge, 3 * edge + 2], middle: Some(3 * edge + 1) };
+        let (points, parts) = (lines.as_flattened(), parts.map(|(line, part)| (edge(line), part)));
+        let mut load = vec![0.0; 2 * points.len()];
+        add_traction(points, parts, |x, normal| self.force.at(x, normal, t), &mut load);
+        let forces = points.iter().zip(load.as_chunks().0);
+        forces.fold([0.0; 3], |[x, y, moment], (point, [fx, fy])| {
+            [x + fx, y + fy, moment + (point[0] - cx) * fy - (point[1] - cy) * fx]
+        })
     }
 
     /// The forces on all edges at time t, by expression.
@@ -91,6 +116,54 @@ impl SurfaceForce {
             }
         }
     }
+}
+
+/// The halves of `edges`, each a parabola, of a curve that is smooth where they meet without a corner.
+///
+/// The tangents of both edges at a node err in opposite senses, by the length ℓ of a straight edge or the square of the
+/// length of a parabola. Their mean with the weights of the other edge is exact for a circle. At an end of the curve, the
+/// edge turns as at its other end. With the changes d and e of the tangents at s = 0 and 1 and r = 1 − s, the curve is
+/// x(s) + s r² d − s² r e for a straight edge, and x(s) + s r (r − s) (r d + s e) for a parabola, which keeps its middle.
+fn smooth_halves(edges: &[Edge], points: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
+    // |x'| and the normal with the weight of the tangent.
+    let end = |edge: &Edge, s: f64| {
+        let [x, y] = edge.tangent(points, s);
+        let length = x.hypot(y);
+        let weight = if edge.middle.is_some() { length * length } else { length };
+        (length, Face { normal: [y / length, -x / length], length: weight })
+    };
+    let mut faces = BTreeMap::<usize, Vec<(usize, Face)>>::new();
+    for (number, edge) in edges.iter().enumerate() {
+        for (node, s) in edge.ends.into_iter().zip([0.0, 1.0]) {
+            faces.entry(node).or_default().push((number, end(edge, s).1));
+        }
+    }
+    let halves = |(number, edge): (usize, &Edge)| {
+        let changes = [0.0, 1.0].map(|s| {
+            let (length, own) = end(edge, s);
+            let mut others = faces[&edge.ends[s as usize]].iter();
+            let (_, other) = others.find(|(n, face)| *n != number && face.continues(&own))?;
+            let swapped = [(own, other.length), (*other, own.length)];
+            let [own_part, part] = swapped.map(|(face, length)| Face { length, ..face });
+            let [nx, ny] = own_part.joined(&part).normal;
+            Some([length * (own.normal[1] - ny), length * (nx - own.normal[0])])
+        });
+        let [p, q] = edge.ends.map(|node| Vector2::from(points[node]));
+        let chord = (q - p).normalize();
+        let mirrored = |change: Option<[f64; 2]>| {
+            let change = Vector2::from(change?);
+            Some((2.0 * change.dot(&chord) * chord - change).into())
+        };
+        let d = changes[0].or_else(|| mirrored(changes[1])).unwrap_or_default();
+        let e = changes[1].or_else(|| mirrored(changes[0])).unwrap_or_default();
+        let at = |s: f64| {
+            let (x, r) = (edge.at(points, s), 1.0 - s);
+            let [a, b] = if edge.middle.is_some() { [r - s; 2] } else { [1.0, -1.0] };
+            [0, 1].map(|k| x[k] + s * r * (a * r * d[k] + b * s * e[k]))
+        };
+        [[0.0, 0.25, 0.5], [0.5, 0.75, 1.0]].map(|half| half.map(at))
+    };
+    edges.iter().enumerate().flat_map(halves).collect()
 }
 
 #[derive(Debug)]

@@ -1,0 +1,219 @@
+//! Resultants of supports: what is zero, what the boundaries at a common node exert, and which loads balance.
+
+use crate::{
+    bore::disc,
+    support::{
+        ORDERS, adapted, bent, close, distorted, history, moved, order, problem, run, scene,
+        square, turn, unstructured,
+    },
+};
+use signorini::{
+    contact::SOLVERS,
+    evolution::{DiscreteProblem, SetupError},
+    mesh::{Mesh, Order},
+};
+use std::{collections::BTreeMap, f64::consts::PI};
+
+/// The quantities and the figures of contact of the last state, by name.
+fn figures(problem: &DiscreteProblem) -> BTreeMap<String, f64> {
+    let last = run(problem, SOLVERS[0]).last;
+    let names = [problem.quantities(), problem.contact_columns()].concat();
+    names
+        .into_iter()
+        .zip([last.quantities, problem.contact_figures(&last.state)].concat())
+        .collect()
+}
+
+fn of_order(mesh: Mesh, order: Order, text: &str) -> Result<DiscreteProblem, SetupError> {
+    let material = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
+    let text = format!("discretisation.displacement = {}\n{material}\n{text}", 1 + order as u8);
+    problem(mesh, &text)
+}
+
+#[test]
+fn forces_that_balance_have_a_scale_and_need_no_finer_mesh() {
+    // Exact on the first mesh: a bar in pure bending at any angle, a square pressed between axes, one that is moved without
+    // strain, and one that slides on a foundation without pressing it.
+    let material = "accuracy = 0.02\nmaterial = { young = 1e5, plane = 'stress', poisson";
+    let bend = |angle: f64| {
+        let ([c, s], across) = (turn(angle, [1.0, 0.0]), turn(-angle, [0.0, 1.0]));
+        let height = format!("({} * x + {} * y - 0.5)", across[0], across[1]);
+        let height = height.replace("+ -", "- ");
+        format!(
+            "= 0.3 }}\nboundary = [{{ name = 'left', symmetry = true }},
+             {{ name = 'right', traction = ['{} * {height}', '{} * {height}'] }}]",
+            100.0 * c,
+            100.0 * s
+        )
+    };
+    let moves = "= 0.3 }\nboundary = [{ name = 'left', displacement = [1, 2] },
+                 { name = 'right', displacement = [1, 2] }]";
+    let slides =
+        "= 0 }\nboundary = [{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
+                  { name = 'top', symmetry = true }, { name = 'right', traction = [1, 0] }]";
+    let bar = |angle: f64| moved(unstructured(0.3), move |[x, y]| turn(angle, [5.0 * x, y]));
+    let bodies = [
+        (bar(0.0), bend(0.0)),
+        (bar(0.4), bend(0.4)),
+        (bar(2.0), bend(2.0)),
+        (unstructured(0.2), moves.to_owned()),
+        (unstructured(0.2), slides.to_owned()),
+    ];
+    for (mesh, text) in bodies {
+        let (scene, triangles) = (scene(&format!("{material} {text}")), mesh.triangles.len());
+        let found = adapted(&scene, mesh.clone(), 0.02);
+        assert!(found.short.is_none() && found.rounds == 1, "{:?}\n{text}", found.short);
+        assert_eq!(found.mesh.triangles.len(), triangles, "{text}");
+        for bar in found.measured.bars {
+            assert!(bar.bar <= 1e-6 * bar.scale, "{bar:?}\n{text}");
+        }
+        // The resultant of each side is rounding, or as large as the load.
+        let problem = DiscreteProblem::new(scene, mesh).unwrap();
+        for (name, value) in figures(&problem) {
+            let is_force = name.contains(".force") || name.contains("pressure");
+            assert!(!is_force || value == 0.0 || value.abs() > 1e-3, "{name} {value:e}\n{text}");
+        }
+    }
+}
+
+#[test]
+fn contact_without_force_has_no_figures_and_light_contact_has() {
+    // A square between an axis and a wall that comes back to it at the end, exactly or up to `left`.
+    for order in ORDERS {
+        for wall in ["-0.01*sin(pi*t)", "-0.02*min(t, 1 - t)", "-0.01*(1 - t)*t^0.5"] {
+            for left in [0.0, 1e-6, -1e-6] {
+                let text = format!(
+                    "time = {{ end = 1, step = 0.25 }}
+                     boundary = [{{ name = 'left', symmetry = true }},
+                     {{ name = 'bottom', symmetry = true }},
+                     {{ name = 'right', gap = '{wall} + ({left})' }}]"
+                );
+                let problem = of_order(distorted(4), order, &text).unwrap();
+                let last = history(&problem, SOLVERS[0]).1.last;
+                let found = problem.contact_columns().into_iter();
+                let found = found.zip(problem.contact_figures(&last.state));
+                let found: BTreeMap<String, f64> = found.collect();
+                let pressed = left < 0.0;
+                let name = format!("P{} {wall} {left}", 1 + order as u8);
+                assert_eq!(last.record.active_nodes > 0, pressed, "{name}");
+                assert_eq!(last.record.contact_force > 0.0, pressed, "{name}");
+                assert_eq!(found["right.pressure_max"] > 0.0, pressed, "{name}");
+                close(found["right.contact_length"], f64::from(u8::from(pressed)), 1e-12);
+                assert_eq!(found["right.contact_start_x"].is_nan(), !pressed, "{name}");
+                assert_eq!(found["right.peak_y"].is_nan(), !pressed, "{name}");
+            }
+        }
+    }
+}
+
+/// Two sides with displacements and two with tractions, by the stress (σ_xx, σ_yy, σ_xy) and u as functions of x and y.
+fn supported(stress: [&str; 3], left: [&str; 2], bottom: [&str; 2]) -> String {
+    let [xx, yy, xy] = stress;
+    format!(
+        "boundary = [{{ name = 'left', displacement = {left:?} }},
+         {{ name = 'bottom', displacement = {bottom:?} }},
+         {{ name = 'right', traction = ['{xx}', '{xy}'] }},
+         {{ name = 'top', traction = ['{xy}', '{yy}'] }}]"
+    )
+}
+
+#[test]
+fn supports_with_a_common_node_exert_their_tractions_exactly_in_a_patch() {
+    // σ = (3, −2, 0.5) with E = 100 and ν = 0.3; without shear, one side prescribes u·ν alone.
+    let u = ["0.036*x + 0.0065*y", "-0.029*y + 0.0065*x"];
+    let plain = ["0.036*x", "-0.029*y"];
+    let clamp = (["3", "-2", "0.5"], u, u, [-3.0, -0.5, -0.5, 2.0]);
+    let axis = (["3", "-2", "0"], [plain[0], "free"], plain, [-3.0, 0.0, 0.0, 2.0]);
+    for order in ORDERS {
+        for mesh in [distorted(3), distorted(5), unstructured(0.3)] {
+            for (stress, left, bottom, expected) in [clamp, axis] {
+                let text = supported(stress, left, bottom);
+                let found = figures(&of_order(mesh.clone(), order, &text).unwrap());
+                let names = ["left.force_x", "left.force_y", "bottom.force_x", "bottom.force_y"];
+                for (name, expected) in names.into_iter().zip(expected) {
+                    close(found[name], expected, 1e-9);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn supports_with_a_common_node_converge_faster_than_the_mesh() {
+    // σ = (6y, 6xy, −3x²) is in equilibrium; u by E = 100 and ν = 0.3. The force on the side `left`, −∫6y = −3, and all
+    // moments converge, and both sides together balance the load exactly.
+    let u = [
+        "(6*x*y - 0.9*x^2*y - y^3)/100".to_owned(),
+        "(-3*x^2 - 0.9*y^2 + 3*x*y^2 - 2.3*x^3)/100".to_owned(),
+    ];
+    let u = u.each_ref().map(String::as_str);
+    for (order_of_u, least) in ORDERS.into_iter().zip([1.5, 2.5]) {
+        for left in [u, [u[0], "free"]] {
+            let sizes = [4, 8, 16];
+            let errors = sizes.map(|n| {
+                let text = supported(["6*y", "6*x*y", "-3*x^2"], left, u);
+                let problem = of_order(square(n), order_of_u, &text).unwrap();
+                let found = figures(&problem);
+                let sum = |axis: &str| {
+                    found[&format!("left.force_{axis}")] + found[&format!("bottom.force_{axis}")]
+                };
+                // The load is ∫(6y − 3x²) and ∫(6x − 3) over the sides.
+                close(sum("x"), -2.0, 1e-9);
+                close(sum("y"), 0.0, 1e-9);
+                (found["left.force_x"] + 3.0).abs().max(1e-12)
+            });
+            let rate = order(&sizes.map(|n| 1.0 / n as f64), &errors);
+            assert!(
+                rate > least || errors[2] < 1e-9,
+                "P{}: {rate} {errors:?}",
+                1 + order_of_u as u8
+            );
+        }
+    }
+}
+
+#[test]
+fn a_load_along_a_curve_balances_within_the_error_of_its_edges() {
+    // Half rings between axes, of circles and ellipses with uneven edges: f_x is odd in x and so balances, or not.
+    let ring = |nx: usize, stretch: f64, order: Order| {
+        let place = move |[a, r]: [f64; 2]| {
+            let [x, y] =
+                turn(PI - a - 0.2 * (2.0 * a).sin() - 0.1 * (1.0 - a.cos()) * a.sin(), [r, 0.0]);
+            [stretch * x, y]
+        };
+        let flat = moved(Mesh::rectangle(PI, 1.0, nx, 3), |[x, y]| [x, 1.0 + y]);
+        match order {
+            Order::Linear => moved(flat, place),
+            Order::Quadratic => bent(&flat, place),
+        }
+    };
+    let cut = "{ name = 'left', symmetry = true }, { name = 'right', symmetry = true }";
+    let driven = |problem| matches!(problem, Err(SetupError::Driven { .. }));
+    for order in ORDERS {
+        for (nx, stretch) in [(20, 1.0), (40, 1.0), (80, 1.0), (40, 1.5), (80, 1.5), (80, 0.7)] {
+            for load in ["x", "x*y^2", "exp(x) - exp(-x)", "if(x > 0, 1, -1)"] {
+                for side in ["top", "bottom"] {
+                    let with = |more: f64| {
+                        let load = format!("traction = ['{load} + ({more})', 0]");
+                        let text = format!("boundary = [{cut}, {{ name = '{side}', {load} }}]");
+                        of_order(ring(nx, stretch, order), order, &text)
+                    };
+                    let name = format!("P{} {nx} {stretch} {load} {side}", 1 + order as u8);
+                    assert!(!driven(with(0.0)), "{name}");
+                    assert!(driven(with(0.05)) && driven(with(-0.05)), "{name}");
+                }
+            }
+        }
+    }
+    // Discs under tractions that balance by symmetry, and under 1 % of them on one side more.
+    for (n, uneven) in [(24, 0.0), (24, 0.05), (48, 0.1), (96, 0.1)] {
+        for [x, y] in [["x - 3", "0"], ["0", "(y - 2)^3"], ["y - 2", "x - 3"]] {
+            let with = |more: &str| {
+                let load = format!("traction = ['{x} + {more}', '{y}']");
+                let text = format!("boundary = [{{ name = 'rim0', {load} }}]");
+                of_order(disc(n, uneven, 1), Order::Linear, &text)
+            };
+            assert!(!driven(with("0")) && driven(with("0.02")), "{n} {uneven} {x} {y}");
+        }
+    }
+}
