@@ -6,10 +6,7 @@ use crate::{
     petsc::{Ghosts, PetscError, Session, divide},
 };
 use rustc_hash::FxHashMap as HashMap;
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    rc::Rc,
-};
+use std::{collections::BTreeSet, rc::Rc};
 
 /// The nodes and triangles of a subdomain: the owned nodes, the triangles around them, and the other nodes of
 /// these triangles as ghosts.
@@ -183,10 +180,9 @@ impl Subdomain {
             nodes: vertices.field(&part.nodes, 1),
             triangles: vertices.cells(&part.triangles, &triangles),
             curves: part.curves.iter().map(|(n, c)| (n.clone(), vertices.curve(c))).collect(),
-            // The elements know their curvature, the body its materials.
-            curved: BTreeMap::new(),
-            surfaces: BTreeMap::new(),
             gmsh: part.gmsh.clone(),
+            // The elements know their curvature, the body its materials, the constraints the corners.
+            ..Mesh::default()
         };
         let elements = undivided.quadratic.as_ref().zip(quadratic.as_ref());
         let elements = elements.map(|(undivided, nodes)| QuadraticElements {

@@ -1,8 +1,8 @@
 //! The figures of contact of each foundation at a step: length and ends of contact, largest pressure, line of action.
 
-use super::{ContactRow, DiscreteProblem, State};
+use super::{ContactRow, DiscreteProblem, State, contact_line::parts_from_open_nodes};
 
-/// The first and the last active node with the body on the left, the one with the largest pressure, and the point of the
+/// The first and the last active node with the body on the left (on a closed part from its longest stretch without contact), the one with the largest pressure, and the point of the
 /// resultant's line of action that is nearest to the middle between the first and the last one.
 const PLACES: [&str; 4] = ["contact_start", "contact_end", "peak", "acts_at"];
 
@@ -20,7 +20,8 @@ impl DiscreteProblem {
         let (rows, _) = self.supports.contact.rows(&self.body, state);
         let figures = |name: &String| {
             let rows = rows_of(&rows, name);
-            let mut active = rows.iter().filter(|row| row.active == 1);
+            let ordered = parts_from_open_nodes(rows).concat();
+            let mut active = ordered.iter().filter(|row| row.active == 1);
             let peak = active.clone().max_by(|a, b| a.pressure.total_cmp(&b.pressure));
             let first = active.next();
             let at = |row: Option<&ContactRow>| row.map_or([f64::NAN; 2], |row| [row.x, row.y]);

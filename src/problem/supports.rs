@@ -4,6 +4,7 @@ use super::{ContactLine, boundary_conditions::BoundaryConditions};
 use crate::{
     contact::ContactPoint,
     fem::{Body, Subdomain},
+    mesh::Lines,
     scene::{Boundary, Scene},
 };
 use std::collections::BTreeMap;
@@ -23,20 +24,23 @@ pub struct Supports {
 type Prescribed = (usize, [f64; 2]);
 
 impl Supports {
-    /// The supports of `scene` on the undivided `body`, with its `conditions`.
-    pub(super) fn new(scene: &Scene, body: &Body, conditions: &BoundaryConditions) -> Self {
+    /// The supports of `scene` on the undivided `body`, with its `conditions` and the lines of its boundary.
+    pub(super) fn new(
+        scene: &Scene,
+        body: &Body,
+        conditions: &BoundaryConditions,
+        lines: &Lines,
+    ) -> Self {
         let mut supports = Self { names: conditions.supports.clone(), ..Self::default() };
         for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
             supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
         }
-        for boundary @ Boundary { name, .. } in &scene.boundaries {
-            let number = supports.names.iter().position(|other| other == name);
-            let curve = body.mesh.curves.get(name);
-            if let (Some(gap), Some(number), Some(curve)) = (boundary.gap(), number, curve) {
-                let edges = body.edges(&curve.edges);
-                supports.contact.add((number, name), gap, &body.nodes.points, &edges);
-            }
-        }
+        let contact = scene.boundaries.iter().filter_map(|boundary @ Boundary { name, .. }| {
+            let number = supports.names.iter().position(|other| other == name)?;
+            let edges = body.edges(&body.mesh.curves.get(name)?.edges);
+            Some((number, &**name, boundary.gap()?, edges))
+        });
+        supports.contact = ContactLine::new(contact, &body.nodes.points, lines);
         supports
     }
 

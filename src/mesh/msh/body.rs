@@ -44,14 +44,15 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
     }
     one_body::check(&nodes, &triangles, &sides)?;
     let curves = curves(contents, &index, &sides);
-    let mut mesh = Mesh { nodes, triangles, curves, surfaces, ..Mesh::default() };
+    let points = (0..listed.len()).filter(|&node| listed[node].is_point).collect();
+    let mut mesh = Mesh { nodes, triangles, curves, surfaces, points, ..Mesh::default() };
     if !contents.midpoints.is_empty() {
         set_midpoints(&mut mesh, contents, &elements, &index, limit)?;
     }
     Ok(mesh)
 }
 
-fn check_planar(&Node { tag, point: [.., z], at }: &Node, limit: f64) -> Result<()> {
+fn check_planar(&Node { tag, point: [.., z], at, .. }: &Node, limit: f64) -> Result<()> {
     match z.abs() > limit {
         true => {
             error_at(at, format!("node {tag} has z = {z}: the body must lie in the plane z = 0"))
