@@ -37,16 +37,23 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
 }
 
 /// An estimate of the angle between the normals of boundary edges and of the smooth curve that they
-/// approximate, rad: the largest angle at which two curved edges meet although the curve is smooth.
+/// approximate, rad. It is the largest angle between two curved edges of a smooth line. A parabola through
+/// points of a circle that subtend 2φ errs by φ³/4 at its ends, so two meet at twice this angle. A line that turns by
+/// more than twice that angle is no smooth curve.
 pub fn normal_error(edges: &[Edge], points: &[[f64; 2]], lines: &Lines) -> f64 {
-    let mut faces = BTreeMap::<usize, Vec<Face>>::new();
+    let mut faces = BTreeMap::<usize, Vec<(Face, f64)>>::new();
     let mut largest = 0.0_f64;
     for edge in edges.iter().filter(|edge| edge.is_curved(points)) {
+        let [[a, b], [c, d]] = [0.0, 1.0].map(|s| edge.tangent(points, s));
+        let half = 0.5 * (a * d - b * c).abs().atan2(a * c + b * d);
+        let at_end = 0.25 * half.powi(3);
         for (node, face) in edge.faces(points, lines) {
             let at_node = faces.entry(node).or_default();
-            let smooth = at_node.iter().filter(|other| other.continues(&face));
-            largest = smooth.map(|other| other.angle(&face)).fold(largest, f64::max);
-            at_node.push(face);
+            let smooth = at_node.iter().filter(|(other, _)| other.continues(&face));
+            let angles = smooth.map(|(other, error)| (other.angle(&face), error + at_end));
+            let smooth = angles.filter(|(angle, expected)| *angle <= 2.0 * expected);
+            largest = smooth.map(|(angle, _)| angle).fold(largest, f64::max);
+            at_node.push((face, at_end));
         }
     }
     largest
