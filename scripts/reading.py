@@ -161,11 +161,41 @@ def _contact_rows(path):
 
 
 def _contact_curves(folder, time):
-    """The connected parts of each contact boundary. The rows of a part are consecutive."""
-    rows = _contact_rows(folder / "contact.csv").get(time, [])
-    curves = []
-    for (name, _), part in groupby(rows, key=lambda row: (row["boundary"], row["part"])):
+    """The connected parts of each contact boundary."""
+    path, curves = folder / "contact.csv", []
+    for (name, number), part in _parts(_contact_rows(path).get(time, [])):
         columns = ("x", "y", "gap", "pressure", "active")
-        x, y, gap, pressure, active = np.array([[row[key] for key in columns] for row in part]).T
+        values = np.array([[row[key] for key in columns] for row in part])[_orders(path)[name, number]]
+        x, y, gap, pressure, active = values.T
         curves.append(ContactCurve(name, np.column_stack((x, y)), gap, pressure, active > 0.0))
     return curves
+
+
+def _parts(rows):
+    """The rows of each connected part, which are consecutive, with its boundary and number."""
+    parts = groupby(rows, key=lambda row: (row["boundary"], row["part"]))
+    return [(key, list(part)) for key, part in parts]
+
+
+@cache
+def _orders(path):
+    """By boundary and part: the order of the rows along it. A closed part begins and ends where no pressure acts at any time, in
+    the middle of the longest such stretch, or at the least pressure."""
+    parts, orders = defaultdict(list), {}
+    for rows in _contact_rows(path).values():
+        for key, part in _parts(rows):
+            parts[key].append(part)
+    for key, states in parts.items():
+        place, normal = (lambda row, k=k: (row[f"{k}x"], row[f"{k}y"]) for k in ("", "normal_"))
+        first, last = states[0][0], states[0][-1]
+        orders[key] = np.arange(len(states[0]))
+        if len(states[0]) > 3 and place(first) == place(last):
+            # Without a corner the first and the last row are one node.
+            count = len(states[0]) - (normal(first) == normal(last))
+            largest = np.max([[row["pressure"] for row in part[:count]] for part in states], axis=0)
+            loaded = np.flatnonzero(largest)
+            gaps = np.diff(loaded, append=loaded[:1] + count)
+            k = gaps.argmax() if len(gaps) else None
+            begin = 0 if k is None else largest.argmin() if gaps[k] < 2 else loaded[k] + gaps[k] // 2
+            orders[key] = (begin + np.arange(count + 1)) % count
+    return orders

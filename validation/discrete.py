@@ -16,6 +16,7 @@ import shared  # noqa: F401
 from signorini_results import derivatives, functions
 from expressions import Expression
 from lagrange import SIDES, Lagrange
+from outline import Outline
 from scene import DAMAGE, direction_of, displacement_order, elasticity, of_material
 
 # Lines at an angle below the first value are one line. Below the second value rounding may decide.
@@ -26,7 +27,7 @@ POINTS = {1: np.full((1, 3), 1 / 3), 2: np.full((3, 3), 1 / 6) + 0.5 * np.eye(3)
 SHARES = {1: (1 / 2, 1 / 2), 2: (1 / 6, 1 / 6, 4 / 6)}
 # Parts of an edge in which a traction is integrated.
 PARTS = 256
-CORNER = np.pi / 6  # edges at larger angles meet in a corner
+ONE = 1e-4  # directions within this angle are one
 
 
 def varies(texts):
@@ -66,7 +67,7 @@ class Discrete:
         self.density = of_material(scene, mesh, "material", "density", 0.0)
         self.d = elasticity(self.young, poisson, scene["material"].get("plane", "stress"))
         self.element = np.einsum("eqki,ekl,eqlj,eq->eqij", self.b, self.d, self.b, self.weight)
-        self.boundaries = scene.get("boundary", [])
+        self.boundaries, self.outline = scene.get("boundary", []), Outline(mesh)
         self._gaps = self._contact_faces()
         self.contact = self.contact_rows(0.0)
         self.prescribed = self._prescribed()
@@ -128,8 +129,8 @@ class Discrete:
         return q - p + 4 * (1 - 2 * s) * self.space.offsets(edges)
 
     def faces(self, name):
-        """Per node of a curve: its (normal, length). The normal is the length-weighted mean of the outward normals of the
-        adjacent edges; a corner has one for each side."""
+        """Per node of a curve: its (normal, length, normal of the line). The normal is the length-weighted mean of the outward
+        normals of the adjacent edges; a corner has one for each side."""
         edges, parts = self.mesh.edges(name), {}
         outward, _ = self.mesh.outward_normals(name)
         for nodes, s, share in zip(self.space.on(edges).T, (0, 1, 0.5), SHARES[self.order]):
@@ -140,9 +141,14 @@ class Discrete:
             p, q = self.mesh.nodes[edges].transpose(1, 0, 2)
             chord = q - p
             turn = np.sign(chord[:, 1] * outward[:, 0] - chord[:, 0] * outward[:, 1])
-            for node, normal, part in zip(nodes, turn[:, None] * normals, share * length):
-                parts.setdefault(int(node), []).append((normal, part, []))
-        return {node: [face[:2] for face in merged(found)] for node, found in parts.items()}
+            for edge, node, normal, part in zip(edges.tolist(), nodes.tolist(), turn[:, None] * normals, share * length):
+                of_line = normal
+                if node in edge:
+                    tangent = self.outline.tangent(node, edge[edge[0] == node])
+                    of_line = np.array([tangent.imag, -tangent.real])
+                    of_line *= np.sign(of_line @ normal)
+                parts.setdefault(node, []).append((normal, part, [], of_line))
+        return {node: [(n, w, of_line) for n, w, _, of_line in merged(found)] for node, found in parts.items()}
 
     def _contact_faces(self):
         """Per row: (node, normal, length, gaps). The normal is fixed, or that of a face. Where curves meet smoothly there is
@@ -154,9 +160,9 @@ class Discrete:
             gap, fixed = Expression(boundary["gap"]), direction_of(boundary)
             for node, faces in self.faces(boundary["name"]).items():
                 if fixed is not None:
-                    faces = [(fixed, sum(length for _, length in faces))]
-                rows.setdefault(node, []).extend((n, w, [(gap, w)]) for n, w in faces)
-        return [(node, n, w, gaps) for node, parts in sorted(rows.items()) for n, w, gaps in merged(parts, CORNER)]
+                    faces = [(fixed, sum(face[1] for face in faces), fixed)]
+                rows.setdefault(node, []).extend((n, w, [(gap, w)], of_line) for n, w, of_line in faces)
+        return [(node, n, w, gaps) for node, parts in sorted(rows.items()) for n, w, gaps, _ in merged(parts)]
 
     def contact_rows(self, t):
         """u·ν ≤ g at time t, with the smallest of several gaps. The lengths of the others bear no pressure."""
@@ -173,7 +179,7 @@ class Discrete:
         rows = []
         for boundary in self.boundaries:
             if boundary.get("symmetry"):
-                rows += [(node, n, None) for node, faces in self.faces(boundary["name"]).items() for n, _ in faces]
+                rows += [(node, n, None) for node, faces in self.faces(boundary["name"]).items() for n, _, _ in faces]
             for axis, text in enumerate(boundary.get("displacement", [])):
                 if str(text).strip() != "free":
                     value, d = Expression(text), np.eye(2)[axis]
@@ -279,18 +285,17 @@ def angle(a, b):
     return np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b)
 
 
-def merged(parts, largest=CORNER + 1e-9):
-    """Joins (normal, length, gaps) of edges or curves with normals at less than the `largest` angle. The smallest gap
-    counts."""
+def merged(parts):
+    """Joins (normal, length, gaps, normal of the line) of edges or curves on one line. The smallest gap counts."""
     rows = []
-    for normal, length, gaps in parts:
-        for k, (n, w, others) in enumerate(rows):
-            if angle(n, normal) < largest:
+    for normal, length, gaps, of_line in parts:
+        for k, (n, w, others, line) in enumerate(rows):
+            if min(angle(n, normal), angle(line, of_line)) <= ONE:
                 mean = w * n + length * normal
-                rows[k] = (mean / np.linalg.norm(mean), w + length, others + gaps)
+                rows[k] = (mean / np.linalg.norm(mean), w + length, others + gaps, line)
                 break
         else:
-            rows.append((normal, length, gaps))
+            rows.append((normal, length, gaps, of_line))
     return rows
 
 

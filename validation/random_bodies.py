@@ -14,6 +14,7 @@ from scipy.sparse.csgraph import connected_components
 import shared  # noqa: F401
 from elements import Pieces, counter_clockwise
 from lagrange import SIDES, Lagrange
+from outline import Outline
 from triangulation import Triangulation, edge_keys
 
 
@@ -220,6 +221,14 @@ def patched(rng, mesh):
     return replace(mesh, surfaces=surfaces)
 
 
+def with_points(rng, mesh):
+    """The body with points of its geometry: sharp corners and some other nodes of its boundary."""
+    outline = Outline(mesh)
+    is_sharp = lambda node, ends: len(ends) != 2 or not outline.turns_little(node, ends)
+    points = (node for node, ends in sorted(outline.ends.items()) if is_sharp(node, ends) or rng.random() < 0.2)
+    return replace(mesh, points=frozenset(points))
+
+
 def write_msh(mesh, path):
     """MSH 4.1, text: numbers as Python prints them, which reads back exactly. Each physical group is an entity."""
     space = Lagrange(mesh, 1 if mesh.middles is None else 2)
@@ -236,11 +245,19 @@ def write_msh(mesh, path):
     count = len(space.points)
     lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names)), *names,
              "$EndPhysicalNames", "$Entities"]
-    lines += [f"0 {len(mesh.curves)} {len(groups) - len(mesh.curves)} 0"]
+    # Blocks of nodes (dimension, entity, first node, node after the last one): each point is one.
+    points = sorted(mesh.points)
+    begins = [0, *(node + 1 for node in points)]
+    blocks = [(0, k, node, node + 1) for k, node in enumerate(points, 1)]
+    blocks += [(2, groups[-1][1], a, b) for a, b in zip(begins, [*points, count]) if a < b]
+    blocks.sort(key=lambda block: block[2])
+    coordinates = [f"{x!r} {y!r} 0" for x, y in space.points.tolist()]
+    lines += [f"{len(points)} {len(mesh.curves)} {len(groups) - len(mesh.curves)} 0"]
+    lines += [f"{k} {coordinates[node]} 0" for k, node in enumerate(points, 1)]
     lines += [f"{k} 0 0 0 0 0 0 1 {k} 0" for _, k, _, _ in groups]
-    lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 {groups[-1][1]} 0 {count}"]
-    lines += [str(i) for i in range(1, count + 1)]
-    lines += [f"{x!r} {y!r} 0" for x, y in space.points.tolist()]
+    lines += ["$EndEntities", "$Nodes", f"{len(blocks)} {count} 1 {count}"]
+    for dimension, entity, a, b in blocks:
+        lines += [f"{dimension} {entity} 0 {b - a}", *(str(node + 1) for node in range(a, b)), *coordinates[a:b]]
     total = sum(len(nodes) for _, _, _, nodes in groups)
     lines += ["$EndNodes", "$Elements", f"{len(groups)} {total} 1 {total}"]
     tag = 0

@@ -18,8 +18,8 @@ from triangulation import Triangulation
 PROFILES = ("1", "t", "cos(pi*t)", "(1 - 2*t)", "sin(2*pi*t)", "(0.2 + t^2)", "(t - 0.5)")
 
 # Parts of the scenes: with quadratic displacements; of these and of the others on a mesh with curved sides;
-# with several materials; with a gap that moves, of scenes with time and without.
-QUADRATIC, CURVED, CURVED_LINEAR, PATCHED, MOVING, STILL = 0.4, 0.6, 0.1, 0.3, 0.4, 0.1
+# with several materials; with a gap that moves, of scenes with time and without; with points of the geometry in the mesh.
+QUADRATIC, CURVED, CURVED_LINEAR, PATCHED, MOVING, STILL, WITH_POINTS = 0.4, 0.6, 0.1, 0.3, 0.4, 0.1, 0.5
 
 
 @dataclass
@@ -303,6 +303,8 @@ def vary(case, seed, number, order=None):
     for boundary in case.scene["boundary"]:
         if "gap" in boundary and rng.random() < (MOVING if timed else STILL):
             boundary["gap"] += motion(rng, case, timed)
+    if rng.random() < WITH_POINTS:
+        case.mesh = bodies.with_points(rng, case.mesh)
 
 
 def materials(rng, case):

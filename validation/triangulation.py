@@ -15,13 +15,14 @@ from scene import SceneError
 class Triangulation:
     """Nodes (n, 2), triangles (m, 3) counter-clockwise, the edges of each named curve and, for each
     named surface, whether a triangle is in it; of a file of second order the points in the middle of
-    the sides 01, 12, 20 (m, 3, 2)."""
+    the sides 01, 12, 20 (m, 3, 2); the nodes at points of the geometry, if they are known."""
 
     nodes: np.ndarray
     triangles: np.ndarray
     curves: dict
     middles: np.ndarray = None
     surfaces: dict = field(default_factory=dict)
+    points: frozenset = frozenset()
 
     def outward_normals(self, name):
         """Unit outward normals and lengths of a curve's edges; all must be boundary edges."""
@@ -96,7 +97,9 @@ def read_triangulation(path):
             curves[name] = np.unique(np.sort(np.vstack(edges), axis=1), axis=0)
         elif dimension == 2:
             surfaces[name] = np.concatenate(inside)
-    return Triangulation(nodes, triangles, curves, middles, surfaces)
+    entities = mesh.point_data.get("gmsh:dim_tags", np.ones((len(mesh.points), 2)))
+    points = frozenset(np.flatnonzero(entities[used, 0] == 0).tolist())
+    return Triangulation(nodes, triangles, curves, middles, surfaces, points)
 
 
 def mesh_geometry(geometry, table, target, order=1):

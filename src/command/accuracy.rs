@@ -5,7 +5,7 @@ use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
     evolution::{AIM, Outcome, percent},
     interrupt::Signal,
-    mesh::{CORNER_ANGLE, Kink, Mesh, Order},
+    mesh::{Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension},
     scene::{Scene, Stepping},
@@ -153,8 +153,7 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
 pub(super) fn kink_note(task: &Task) -> Option<String> {
     let (mesh, scene) = (&task.adapted.as_ref()?.mesh, task.problem.scene());
     let kinks = kinks(scene, mesh, scene.accuracy?).into_iter();
-    let may_be_smooth = |kink: &Kink| kink.angle < CORNER_ANGLE;
-    let kinks = kinks.filter(|(allowed, kink)| may_be_smooth(kink) && kink.angle > 2.0 * allowed);
+    let kinks = kinks.filter(|(allowed, kink)| !kink.is_corner && kink.angle > 2.0 * allowed);
     let (_, kink) = kinks.max_by(|(a, p), (b, q)| (p.angle / a).total_cmp(&(q.angle / b)))?;
     let at = mesh.place(mesh.nodes[kink.node]);
     Some(format!(

@@ -31,7 +31,7 @@ use ranks::require_one_process;
 use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
     interrupt::{Signal, received},
-    mesh::{self, CORNER_ANGLE, Kink, Mesh, MeshError, Order},
+    mesh::{self, Kink, Mesh, MeshError, Order},
     output::terminal::say,
     scene::{Boundary, Condition, MeshSource, SCHEMA, Scene},
 };
@@ -255,7 +255,7 @@ fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, Failure> {
     let mut ratio = 0.25_f64;
     for grading in 0..GRADINGS {
         // The end of a slender ellipse is no corner, though it looks like one on the first meshes.
-        let is_corner = |kink: &Kink| grading >= 2 && kink.angle > CORNER_ANGLE;
+        let is_corner = |kink: &Kink| grading >= 2 && kink.is_corner;
         let is_rough = |(allowed, kink): &(f64, Kink)| kink.angle > *allowed && !is_corner(kink);
         let rough = kinks(scene, &first, accuracy).into_iter().filter(is_rough);
         let size = |(allowed, kink): (f64, Kink)| {

@@ -4,7 +4,7 @@ use super::{Bound, Conflict, ConstraintError, Row};
 use crate::{
     ROUNDING,
     fem::{NodalBases, Subdomain},
-    mesh::extent,
+    mesh::{SAME_DIRECTION, extent},
 };
 use nalgebra::{Matrix2, Vector2};
 use std::collections::BTreeMap;
@@ -40,9 +40,6 @@ struct FurtherGap {
 
 /// Directions whose lines are closer than this angle, rad, are one direction.
 const PARALLEL: f64 = 1e-8;
-/// Directions closer than this angle, rad, that are not one direction, are refused: their basis at a node
-/// loses too many digits. Contact solves reach the default tolerance down to this angle.
-pub(super) const DEPENDENT: f64 = 1e-4;
 
 impl Constraints {
     /// Combines all rows node by node: the prescribed ones, then the gaps, joined where boundaries meet smoothly.
@@ -259,7 +256,7 @@ impl Constraints {
 /// The direction of `basis` on whose line `normal` lies.
 fn parallel(basis: &[[f64; 2]], normal: [f64; 2]) -> Result<Option<usize>, Conflict> {
     let angles = || basis.iter().map(|b| cross(*b, normal).abs());
-    if let Some(angle) = angles().find(|angle| (PARALLEL..DEPENDENT).contains(angle)) {
+    if let Some(angle) = angles().find(|angle| (PARALLEL..SAME_DIRECTION).contains(angle)) {
         return Err(Conflict::Dependent(angle));
     }
     Ok(angles().position(|angle| angle < PARALLEL))

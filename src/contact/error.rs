@@ -1,6 +1,7 @@
 //! Errors in contact conditions and in the answers of solvers.
 
-use super::{ContactReport, Kkt, constraints::DEPENDENT};
+use super::{ContactReport, Kkt};
+use crate::mesh::SAME_DIRECTION;
 use crate::petsc::{Communicator, PetscError};
 
 /// Displacement conditions at a node that contradict each other.
@@ -43,7 +44,7 @@ pub enum Conflict {
     #[error(
         "two conditions (prescribed directions or contact normals) differ from one line by an angle \
          of only {0:.1e}: double precision cannot tell their effects apart; open the wedge there \
-         beyond {DEPENDENT:e} rad, or let one boundary end before the node"
+         beyond {SAME_DIRECTION:e} rad, or let one boundary end before the node"
     )]
     Dependent(f64),
     /// More independent conditions than the two unknowns of a node.

@@ -1,6 +1,9 @@
 //! Boundary edges of the elements of u: a straight line or a parabola.
 
-use crate::{ROUNDING, mesh::Face};
+use crate::{
+    ROUNDING,
+    mesh::{Face, Lines},
+};
 use std::{array, collections::BTreeMap};
 
 /// The nodes of u on an edge x(s), 0 ≤ s ≤ 1.
@@ -34,19 +37,20 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
 }
 
 /// An estimate of the angle between the normals of boundary edges and of the smooth curve that they
-/// approximate, rad. It is the largest angle between two curved edges that meet smoothly. A parabola through
-/// points of a circle that subtend 2φ errs by φ³/4 at its ends, so two meet at twice this angle. More than
-/// twice that angle is a corner of the geometry.
-pub fn normal_error(edges: &[Edge], points: &[[f64; 2]]) -> f64 {
+/// approximate, rad. It is the largest angle between two curved edges of a smooth line. A parabola through
+/// points of a circle that subtend 2φ errs by φ³/4 at its ends, so two meet at twice this angle. A line that turns by
+/// more than twice that angle is no smooth curve.
+pub fn normal_error(edges: &[Edge], points: &[[f64; 2]], lines: &Lines) -> f64 {
     let mut faces = BTreeMap::<usize, Vec<(Face, f64)>>::new();
     let mut largest = 0.0_f64;
     for edge in edges.iter().filter(|edge| edge.is_curved(points)) {
         let [[a, b], [c, d]] = [0.0, 1.0].map(|s| edge.tangent(points, s));
         let half = 0.5 * (a * d - b * c).abs().atan2(a * c + b * d);
         let at_end = 0.25 * half.powi(3);
-        for (node, face) in edge.faces(points) {
+        for (node, face) in edge.faces(points, lines) {
             let at_node = faces.entry(node).or_default();
-            let angles = at_node.iter().map(|(other, error)| (other.angle(&face), error + at_end));
+            let smooth = at_node.iter().filter(|(other, _)| other.continues(&face));
+            let angles = smooth.map(|(other, error)| (other.angle(&face), error + at_end));
             let smooth = angles.filter(|(angle, expected)| *angle <= 2.0 * expected);
             largest = smooth.map(|(angle, _)| angle).fold(largest, f64::max);
             at_node.push((face, at_end));
@@ -96,24 +100,26 @@ impl Edge {
         .flatten()
     }
 
-    /// The nodes of a boundary edge, each with its outward normal and its tributary length ∫ φ_i: half
-    /// of the edge for P1; for P2 1/6 of it at the ends and 4/6 in the middle (Simpson's rule).
-    pub fn faces(&self, points: &[[f64; 2]]) -> impl Iterator<Item = (usize, Face)> {
+    /// The nodes of an edge of the boundary, whose lines are `lines`, each with its outward normals and its tributary
+    /// length ∫ φ_i: half of the edge for P1; for P2 1/6 of it at the ends and 4/6 in the middle (Simpson's rule).
+    pub fn faces(&self, points: &[[f64; 2]], lines: &Lines) -> impl Iterator<Item = (usize, Face)> {
         let [a, b] = self.ends;
         let face = |s: f64, part: f64| {
             let [x, y] = self.tangent(points, s);
             let length = x.hypot(y);
-            Face { normal: [y / length, -x / length], length: part * length }
+            Face::plane([y / length, -x / length], part * length)
         };
-        match self.middle {
-            None => [Some((a, face(0.0, 0.5))), Some((b, face(1.0, 0.5))), None],
-            Some(middle) => [
-                Some((a, face(0.0, 1.0 / 6.0))),
-                Some((b, face(1.0, 1.0 / 6.0))),
-                Some((middle, face(0.5, 4.0 / 6.0))),
-            ],
-        }
-        .into_iter()
-        .flatten()
+        let end = |part: f64| {
+            let ([x, y], [to_x, to_y]) = (lines.tangent(a, b), lines.tangent(b, a));
+            [
+                Some((a, Face { of_line: [y, -x], ..face(0.0, part) })),
+                Some((b, Face { of_line: [-to_y, to_x], ..face(1.0, part) })),
+            ]
+        };
+        let (ends, middle) = match self.middle {
+            None => (end(0.5), None),
+            Some(middle) => (end(1.0 / 6.0), Some((middle, face(0.5, 4.0 / 6.0)))),
+        };
+        ends.into_iter().chain([middle]).flatten()
     }
 }

@@ -186,7 +186,7 @@ impl Subdomain {
             triangles: vertices.cells(&part.triangles, &triangles),
             curves: part.curves.iter().map(|(n, c)| (n.clone(), vertices.curve(c))).collect(),
             gmsh: part.gmsh.clone(),
-            // The elements know their curvature, the body its materials.
+            // The elements know their curvature, the body its materials, the constraints the corners.
             ..Mesh::default()
         };
         let elements = undivided.quadratic.as_ref().zip(quadratic.as_ref());

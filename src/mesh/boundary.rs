@@ -2,9 +2,8 @@
 
 use std::collections::BTreeMap;
 
-/// Edges whose normals differ by more than this angle (radians) meet in a corner. On six bodies half
-/// and twice of it changed figures of one.
-pub const CORNER_ANGLE: f64 = std::f64::consts::PI / 6.0;
+/// Directions at most at this angle, rad, are one: with two of them a node would lose too many digits.
+pub const SAME_DIRECTION: f64 = 1e-4;
 
 /// A node of a set of boundary edges.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,39 +20,47 @@ pub struct BoundaryNode {
 pub struct Face {
     /// Outward unit normal.
     pub normal: [f64; 2],
+    /// A vector normal to the boundary that the mesh approximates. Where this is smooth, both edges have the same one.
+    pub of_line: [f64; 2],
     /// Tributary length, m: half the length of each edge of the face.
     pub length: f64,
 }
 
 impl Face {
-    /// Whether the other face continues this one smoothly: the angle between their normals is at most
-    /// [`CORNER_ANGLE`].
+    /// A face of a plane with this unit normal.
+    pub fn plane(normal: [f64; 2], length: f64) -> Self {
+        Self { normal, of_line: normal, length }
+    }
+
+    /// Whether the other face continues this one smoothly. Faces with the same normal do, whatever they approximate.
     pub fn continues(&self, other: &Self) -> bool {
-        // The tolerance protects boundaries whose edges turn by exactly 30° against rounding.
-        self.angle(other) <= CORNER_ANGLE + 1e-9
+        angle(self.of_line, other.of_line).min(self.angle(other)) <= SAME_DIRECTION
     }
 
     /// The angle between both normals, rad.
     pub fn angle(&self, other: &Self) -> f64 {
-        let ([a, b], [c, d]) = (self.normal, other.normal);
-        // The cosine alone would lose small angles to rounding.
-        (a * d - b * c).abs().atan2(a * c + b * d)
+        angle(self.normal, other.normal)
     }
 
     /// Both faces as one: the length-weighted mean of the normals, the sum of the lengths.
     pub fn joined(&self, other: &Self) -> Self {
         let sum = [0, 1].map(|i| self.length * self.normal[i] + other.length * other.normal[i]);
         let norm = sum[0].hypot(sum[1]);
-        Self { normal: sum.map(|x| x / norm), length: self.length + other.length }
+        Self { normal: sum.map(|x| x / norm), length: self.length + other.length, ..*self }
     }
+}
+
+/// The angle between two vectors, rad.
+fn angle([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
+    // The cosine alone would lose small angles to rounding.
+    (a * d - b * c).abs().atan2(a * c + b * d)
 }
 
 /// The nodes of a set of boundary edges, in increasing order. Each item of `faces` is a node and the face of
 /// one edge at this node.
 ///
-/// A node's normal is the length-weighted mean of its edges' normals. At a corner the normals differ by more
-/// than [`CORNER_ANGLE`], and the node keeps both. The sum of the lengths of all faces is the length of the
-/// edges.
+/// A node's normal is the length-weighted mean of its edges' normals. At a corner of the boundary the node keeps both. The
+/// sum of the lengths of all faces is the length of the edges.
 pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<BoundaryNode> {
     let nodes = joined_faces(faces.into_iter().map(|(node, face)| (node, face, ())));
     let node = |(node, faces): (usize, Vec<(Face, Vec<()>)>)| BoundaryNode {

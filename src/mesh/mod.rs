@@ -8,20 +8,22 @@
 //! counter-clockwise order, or a [`MeshError`] names the file and the line.
 
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 mod boundary;
 mod error;
 mod gmsh;
+mod lines;
 mod msh;
 mod numbering;
 mod quadratic;
 mod rectangle;
 mod refine;
 
-pub use boundary::{BoundaryNode, CORNER_ANGLE, Face, boundary_nodes, joined_faces};
+pub use boundary::{BoundaryNode, Face, SAME_DIRECTION, boundary_nodes, joined_faces};
 pub use error::MeshError;
 pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
+pub use lines::Lines;
 pub use msh::{parse, read};
 pub use quadratic::Kink;
 pub use refine::Refinement;
@@ -55,6 +57,8 @@ pub struct Mesh {
     /// The triangles of the physical surfaces by name, in increasing order; the tag names a group without a
     /// name. A triangle may be in several.
     pub surfaces: BTreeMap<String, Vec<usize>>,
+    /// The nodes at points of the geometry, where its curves begin and end. Empty if they are unknown.
+    pub points: BTreeSet<usize>,
     /// The midpoints of curved edges, m, by their ends in increasing order. All other edges are straight.
     /// Only quadratic elements use the midpoints.
     pub curved: BTreeMap<[usize; 2], [f64; 2]>,

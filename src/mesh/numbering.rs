@@ -34,6 +34,7 @@ impl Mesh {
             triangles: triangles.iter().map(|&t| renumbered(&self.triangles[t])).collect(),
             curves,
             surfaces,
+            points: self.points.iter().map(|&node| number[node]).collect(),
             curved: self.curved.iter().map(|(&ends, &at)| (sorted(edge(ends)), at)).collect(),
             gmsh: self.gmsh,
             notes: self.notes,

@@ -4,8 +4,11 @@
 //! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
-use super::{Mesh, Side, sides, sorted};
-use std::{collections::BTreeMap, f64::consts::FRAC_PI_2};
+use super::{Lines, Mesh, Side, sides, sorted};
+use std::{
+    collections::BTreeMap,
+    f64::consts::{FRAC_PI_2, FRAC_PI_6},
+};
 
 /// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
@@ -21,6 +24,8 @@ pub struct Kink {
     pub angle: f64,
     /// The length of the shorter of both edges, m.
     pub length: f64,
+    /// Whether it is a corner of the geometry.
+    pub is_corner: bool,
     /// Whether the line ends there at a straight one, nearly at a right angle. The angle is that to its mirror image.
     pub is_mirrored: bool,
 }
@@ -73,7 +78,8 @@ impl Mesh {
     /// other smooth curves.
     pub fn kinks(&self) -> Vec<Kink> {
         let surfaces = self.surfaces_of_triangles();
-        // By node and by the surfaces on the left and on the right: the directions in which the line arrives and leaves.
+        let lines = Lines::new(self, |triangle| &surfaces[triangle]);
+        // By node and by the surfaces on the left and on the right: the edges by which the line arrives and leaves.
         let (mut arriving, mut leaving) = (BTreeMap::new(), BTreeMap::new());
         for both in sides(&self.triangles).chunk_by(|a, b| a.edge == b.edge) {
             let of = |side: &Side| &surfaces[side.triangle];
@@ -86,25 +92,30 @@ impl Mesh {
                 let [a, b] = side.directed();
                 let between = (of(side), other.map(of));
                 let (_, length) = self.edge_normal([a, b]);
-                leaving.insert((a, between), (self.direction(a, b), length, is_curved));
-                let direction = self.direction(b, a).map(|component| -component);
-                arriving.insert((b, between), (direction, length, is_curved));
+                leaving.insert((a, between), (b, length, is_curved));
+                arriving.insert((b, between), (a, length, is_curved));
             }
         }
-        let kink = |(place, ([x, y], after, is_curved)): (&(usize, _), &([f64; 2], f64, bool))| {
-            let ([before_x, before_y], before, was_curved) = arriving.get(place)?;
-            let turn = (before_x * y - before_y * x).atan2(before_x * x + before_y * y).abs();
+        let kink = |(place, (next, after, is_curved)): (&(usize, _), &(usize, f64, bool))| {
+            let (last, before, was_curved) = arriving.get(place)?;
+            let ends = [*last, *next];
+            let [[a, b], [x, y]] = ends.map(|end| self.direction(place.0, end));
+            let turn = (b * x - a * y).atan2(-a * x - b * y).abs();
             let angle = match (was_curved, is_curved) {
                 (true, true) => turn,
                 (false, false) => return None,
                 _ => 2.0 * (turn - FRAC_PI_2).abs(),
             };
             let is_mirrored = was_curved != is_curved;
-            let is_corner = is_mirrored && angle > MIRRORED;
-            (!is_corner).then_some(Kink {
+            let is_end = is_mirrored && angle > MIRRORED;
+            (!is_end).then(|| Kink {
                 node: place.0,
                 angle,
                 length: before.min(*after),
+                is_corner: match is_mirrored {
+                    true => angle > FRAC_PI_6,
+                    false => !lines.is_smooth(place.0, ends),
+                },
                 is_mirrored,
             })
         };

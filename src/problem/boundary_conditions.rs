@@ -4,7 +4,7 @@ use crate::{
     ROUNDING,
     contact::{RigidMotions, Row},
     fem::{Body, Edge, normal_error},
-    mesh::{BoundaryNode, Face, boundary_nodes, extent, joined_faces},
+    mesh::{BoundaryNode, Face, Lines, boundary_nodes, extent, joined_faces},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
@@ -56,8 +56,8 @@ pub(super) struct Traction {
 }
 
 impl BoundaryConditions {
-    /// The conditions of `scene` on `body`, whose mesh has all curves that the scene names.
-    pub(super) fn new(scene: &Scene, body: &Body) -> Self {
+    /// The conditions of `scene` on `body`, whose mesh has all curves that the scene names, and whose boundary is `lines`.
+    pub(super) fn new(scene: &Scene, body: &Body, lines: &Lines) -> Self {
         let (mesh, points) = (&body.mesh, &body.nodes.points);
         let mut conditions = Self { normal_errors: vec![0.0; points.len()], ..Self::default() };
         let mut gaps = Vec::new();
@@ -67,8 +67,8 @@ impl BoundaryConditions {
             let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
             let edges = body.edges(&curve.edges);
             let follows_mesh = boundary.gap().is_none_or(|gap| gap.normal.is_none());
-            let normal_error = if follows_mesh { normal_error(&edges, points) } else { 0.0 };
-            for node in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points))) {
+            let normal_error = if follows_mesh { normal_error(&edges, points, lines) } else { 0.0 };
+            for node in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points, lines))) {
                 conditions.add_fixed_rows(boundary, points, &node);
                 let largest = &mut conditions.normal_errors[node.node];
                 *largest = largest.max(normal_error);
@@ -89,7 +89,7 @@ impl BoundaryConditions {
             );
         }
         for (node, faces) in joined_faces(gaps) {
-            for (Face { normal: direction, length }, distances) in faces {
+            for (Face { normal: direction, length, .. }, distances) in faces {
                 let row = Row { node, direction, tributary_length: Some(length) };
                 conditions.add(row, points, distances);
             }
@@ -138,7 +138,7 @@ impl BoundaryConditions {
 fn faces(gap: &Gap, at: &BoundaryNode) -> Vec<Face> {
     match gap.normal {
         Some(normal) => {
-            vec![Face { normal, length: at.faces.iter().map(|face| face.length).sum() }]
+            vec![Face::plane(normal, at.faces.iter().map(|face| face.length).sum())]
         }
         None => at.faces.clone(),
     }

@@ -5,11 +5,12 @@
 //! - The gap has a kink there. A wedge whose slope changes by Δ presses with (E Δ/2π) ln(2a/r) at the distance r from its
 //!   tip (Johnson, Contact Mechanics, 5.2), a the half length of contact. A bisection of the edges adds (E Δ/2π) ln 2.
 
-use super::{ContactRow, DiscreteProblem, Singular, State};
+use super::{ContactRow, DiscreteProblem, Singular, State, contact_line::parts_from_open_nodes};
 use std::f64::consts::{LN_2, TAU};
 
-/// The first and the last active node with the body on the left, the one with the largest pressure, and the point of the
-/// resultant's line of action that is nearest to the middle between the first and the last one.
+/// The first and the last active node with the body on the left (on a closed part from its longest stretch without contact),
+/// the one with the largest pressure, and the point of the resultant's line of action that is nearest to the middle between
+/// the first and the last one.
 const PLACES: [&str; 4] = ["contact_start", "contact_end", "peak", "acts_at"];
 
 impl DiscreteProblem {
@@ -26,7 +27,8 @@ impl DiscreteProblem {
         let (rows, _) = self.supports.contact.rows(&self.body, state);
         let figures = |name: &String| {
             let rows = rows_of(&rows, name);
-            let mut active = rows.iter().filter(|row| row.active == 1);
+            let ordered = parts_from_open_nodes(rows).concat();
+            let mut active = ordered.iter().filter(|row| row.active == 1);
             let peak = peak(rows).filter(|row| row.pressure > 0.0);
             let first = active.next();
             let at = |row: Option<&ContactRow>| row.map_or([f64::NAN; 2], |row| [row.x, row.y]);

@@ -17,7 +17,7 @@ use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge},
-    mesh::Face,
+    mesh::{Face, Lines, joined_faces},
     scene::{Expression, Gap},
 };
 use serde::Serialize;
@@ -28,11 +28,16 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct ContactLine {
     /// Part by part with the body on the left.
     pub(super) stations: Vec<Station>,
-    /// Per node: its station and its face on each of its edges.
-    places: BTreeMap<usize, Vec<(usize, Face)>>,
+    /// Per node: its faces, each with the stations and their lengths of it, m.
+    places: BTreeMap<usize, Vec<(Face, Vec<Place>)>>,
+    /// The stations at which closed parts begin and end in a vertex without a corner.
+    seams: Vec<[usize; 2]>,
     /// Per number of a boundary: its gap g(x, y, t), m.
     gaps: BTreeMap<usize, Expression>,
 }
+
+/// A station and its part of the length of a face, m.
+type Place = (usize, f64);
 
 /// The share of a station in a contact point: its factors of the force F and of the pressure F/∫φ, and its gap beyond
 /// the least one there, m.
@@ -89,53 +94,65 @@ pub struct ContactRow {
 type Reaction = [f64; 7];
 
 impl ContactLine {
-    /// Adds the boundary `name` with the number `boundary`.
-    pub(super) fn add(
-        &mut self,
-        (boundary, name): (usize, &str),
-        Gap { distance: gap, normal }: &Gap,
+    /// The parts of these boundaries (number, name, gap, edges) of a body, whose nodes are `points`.
+    pub(super) fn new<'a>(
+        boundaries: impl IntoIterator<Item = (usize, &'a str, &'a Gap, Vec<Edge>)>,
         points: &[[f64; 2]],
+        lines: &Lines,
+    ) -> Self {
+        let (mut line, mut places) = (Self::default(), Vec::new());
+        for (boundary, name, gap, edges) in boundaries {
+            line.gaps.insert(boundary, gap.distance.clone());
+            for (part, edges) in connected(&edges).iter().enumerate() {
+                let row = ContactRow { boundary: name.to_owned(), part, ..ContactRow::default() };
+                line.add((boundary, row), gap.normal, (points, lines), edges, &mut places);
+            }
+        }
+        Self { places: joined_faces(places), ..line }
+    }
+
+    /// Adds the `edges` of a connected part, whose rows are like `row`, and the `places` of its nodes.
+    fn add(
+        &mut self,
+        (boundary, row): (usize, ContactRow),
+        normal: Option<[f64; 2]>,
+        (points, lines): (&[[f64; 2]], &Lines),
         edges: &[Edge],
+        places: &mut Vec<(usize, Face, Place)>,
     ) {
-        self.gaps.insert(boundary, gap.clone());
         let distance =
             |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
-        let face = |face: Face| Face { normal: normal.unwrap_or(face.normal), ..face };
-        for (part, edges) in connected(edges).iter().enumerate() {
-            let station = |node: usize, arc_length: f64, length: f64| {
-                let ([x, y], boundary_name) = (points[node], name.to_owned());
-                let row = ContactRow {
-                    boundary: boundary_name,
-                    part,
-                    arc_length,
-                    x,
-                    y,
-                    ..ContactRow::default()
-                };
-                Station { boundary, length, row }
-            };
-            let (mut start, mut last) = (0.0, None::<Face>);
-            for edge in edges {
-                let faces: Vec<_> = edge.faces(points).map(|(n, f)| (n, face(f))).collect();
-                let [a, b] = edge.ends;
-                let middle = edge.middle.unwrap_or(b);
-                let half = distance(a, middle);
-                let length = half + distance(middle, b);
-                match self.stations.last_mut() {
-                    Some(before) if last.is_some_and(|last| last.continues(&faces[0].1)) => {
-                        before.length += 0.5 * length;
-                    }
-                    _ => self.stations.push(station(a, start, 0.5 * length)),
+        let face = |face: Face| normal.map_or(face, |normal| Face::plane(normal, face.length));
+        let station = |node: usize, arc_length: f64, length: f64| {
+            let [x, y] = points[node];
+            Station { boundary, length, row: ContactRow { arc_length, x, y, ..row.clone() } }
+        };
+        let begin = self.stations.len();
+        let (mut start, mut first, mut last) = (0.0, None::<Face>, None::<Face>);
+        for edge in edges {
+            let faces: Vec<_> = edge.faces(points, lines).map(|(n, f)| (n, face(f))).collect();
+            let [a, b] = edge.ends;
+            let middle = edge.middle.unwrap_or(b);
+            let half = distance(a, middle);
+            let length = half + distance(middle, b);
+            match self.stations.last_mut() {
+                Some(before) if last.is_some_and(|last| last.continues(&faces[0].1)) => {
+                    before.length += 0.5 * length;
                 }
-                let first = self.stations.len() - 1;
-                self.stations.extend(edge.middle.map(|m| station(m, start + half, 0.0)));
-                self.stations.push(station(b, start + length, 0.5 * length));
-                let numbers = [first, self.stations.len() - 1, first + 1];
-                for ((node, face), number) in faces.iter().zip(numbers) {
-                    self.places.entry(*node).or_default().push((number, *face));
-                }
-                (start, last) = (start + length, Some(faces[1].1));
+                _ => self.stations.push(station(a, start, 0.5 * length)),
             }
+            let number = self.stations.len() - 1;
+            self.stations.extend(edge.middle.map(|m| station(m, start + half, 0.0)));
+            self.stations.push(station(b, start + length, 0.5 * length));
+            let numbers = [number, self.stations.len() - 1, number + 1];
+            let of_edge = faces.iter().zip(numbers);
+            places.extend(of_edge.map(|(&(node, face), n)| (node, face, (n, face.length))));
+            (start, first, last) = (start + length, first.or(Some(faces[0].1)), Some(faces[1].1));
+        }
+        let is_closed =
+            edges.first().map(|edge| edge.ends[0]) == edges.last().map(|edge| edge.ends[1]);
+        if is_closed && first.zip(last).is_some_and(|(first, last)| last.continues(&first)) {
+            self.seams.push([begin, self.stations.len() - 1]);
         }
     }
 
@@ -145,17 +162,17 @@ impl ContactLine {
         Self { places: places.collect(), ..self.clone() }
     }
 
-    /// The shares of a contact point at time t: at all faces that its normal continues. Those of the boundaries with the
-    /// least gap there bear the force, by their lengths.
+    /// The shares of a contact point at time t: in the face with its normal. Those of the boundaries with the least gap there
+    /// bear the force, by their lengths.
     pub(super) fn shares(&self, point: &ContactPoint, t: f64) -> Vec<Share> {
-        let Some(all) = self.places.get(&point.node) else { return Vec::new() };
-        let own = Face { normal: point.normal, length: 0.0 };
-        let mut near: Vec<_> = all.iter().filter(|(_, face)| face.continues(&own)).collect();
-        if near.is_empty() {
-            near.extend(all.iter().min_by(|a, b| a.1.angle(&own).total_cmp(&b.1.angle(&own))));
-        }
+        let Some(faces) = self.places.get(&point.node) else { return Vec::new() };
+        let own = Face::plane(point.normal, 0.0);
+        let off = |(face, _): &(Face, Vec<Place>)| face.angle(&own);
+        let nearest = faces.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
         let mut lengths = BTreeMap::new();
-        near.into_iter().for_each(|(s, face)| *lengths.entry(*s).or_insert(0.0) += face.length);
+        for &(station, length) in nearest.iter().flat_map(|(_, places)| places) {
+            *lengths.entry(station).or_insert(0.0) += length;
+        }
         let gap = |station: usize| {
             let Station { boundary, row: ContactRow { x, y, .. }, .. } = &self.stations[station];
             self.gaps.get(boundary).map_or(0.0, |gap| gap.eval(*x, *y, t))
@@ -199,9 +216,9 @@ impl ContactLine {
             let row = self.stations[station].row.clone();
             ContactRow { time, normal_x, normal_y, gap, pressure, active, force, ..row }
         };
-        let nodal = |(node, places): (&usize, &Vec<(usize, Face)>)| {
-            let largest = places.iter().map(|(station, _)| pressures[*station]);
-            (*node, largest.fold(0.0, f64::max))
+        let nodal = |(node, faces): (&usize, &Vec<(Face, Vec<Place>)>)| {
+            let places = faces.iter().flat_map(|(_, places)| places);
+            (*node, places.map(|(station, _)| pressures[*station]).fold(0.0, f64::max))
         };
         (all.iter().map(row).collect(), self.places.iter().map(nodal).collect())
     }
@@ -227,6 +244,11 @@ impl ContactLine {
         }
         let vertices = stations.iter().zip(&mut forces).filter(|(of, _)| of.length > 0.0);
         vertices.for_each(|(of, force)| *force /= of.length);
+        for seam in &self.seams {
+            let [p, q] = seam.map(|station| (stations[station].length, forces[station]));
+            let mean = (p.0 * p.1 + q.0 * q.1) / (p.0 + q.0);
+            seam.iter().for_each(|station| forces[*station] = mean);
+        }
         for i in middles() {
             let (a, b) = (i - 1, i + 1);
             let part = (arc(i) - arc(a)) / (arc(b) - arc(a));
@@ -242,8 +264,8 @@ impl ContactLine {
         /// Smaller pressures than this fraction of the largest are light.
         const LIGHT: f64 = 0.05;
         let (mut length, mut ends) = (0.0, Vec::new());
-        for part in rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part)) {
-            let [first, .., last] = part else { continue };
+        for part in parts_from_open_nodes(rows) {
+            let [first, .., last] = &part[..] else { continue };
             let rows = self.stations.iter().map(|station| &station.row);
             let is_here =
                 |of: &&ContactRow| (&of.boundary, of.part) == (&first.boundary, first.part);
@@ -263,6 +285,36 @@ impl ContactLine {
         }
         (length, ends)
     }
+}
+
+/// The rows of each part. A closed part begins and ends at one node: the first one of the longest stretch without contact,
+/// or, if all nodes are active, that with the least pressure.
+pub(super) fn parts_from_open_nodes(rows: &[ContactRow]) -> Vec<Vec<ContactRow>> {
+    let from_open_node = |part: &[ContactRow]| {
+        let [first, .., last] = part else { return part.to_vec() };
+        let is_closed = (first.x, first.y) == (last.x, last.y) && first.arc_length == 0.0;
+        let (count, whole) = (part.len(), last.arc_length);
+        let active: Vec<usize> = (0..count).filter(|&i| part[i].active == 1).collect();
+        if !is_closed || active.is_empty() {
+            return part.to_vec();
+        }
+        let next = active.iter().cycle().skip(1);
+        let stretches = active.iter().zip(next).filter(|(a, b)| (*a + 1) % count != **b);
+        let arc = |(a, b): (&usize, &usize)| {
+            (part[*b].arc_length - part[*a].arc_length).rem_euclid(whole)
+        };
+        let longest = stretches.max_by(|a, b| arc(*a).total_cmp(&arc(*b)));
+        let lightest = (0..count).min_by(|&a, &b| part[a].pressure.total_cmp(&part[b].pressure));
+        let start = longest.map_or(lightest.unwrap_or(0), |(a, _)| (a + 1) % count);
+        let row = |i: usize| {
+            let row = &part[i % count];
+            let arc_length = row.arc_length - part[start].arc_length + whole * (i / count) as f64;
+            ContactRow { arc_length, ..row.clone() }
+        };
+        (start..=start + count).map(row).collect()
+    };
+    let parts = rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part));
+    parts.map(from_open_node).collect()
 }
 
 /// The connected parts of a curve, each with its edges in order. The body is on the left of all edges.

@@ -45,7 +45,7 @@ pub(crate) use unresolved::unresolved;
 use crate::{
     contact::{Certificate, Constraints, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
-    mesh::Mesh,
+    mesh::{Lines, Mesh},
     model::DamageLaw,
     petsc::{PetscError, Session},
     scene::{Scene, Stepping, TimeGrid},
@@ -98,7 +98,8 @@ impl DiscreteProblem {
         scene.check_mesh(&mesh)?;
         let mut body = Body::new(mesh, scene.order);
         body.materials = scene.materials_of(&body.mesh);
-        let mut conditions = BoundaryConditions::new(&scene, &body);
+        let lines = Lines::boundary(&body.mesh);
+        let mut conditions = BoundaryConditions::new(&scene, &body, &lines);
         let motions = conditions.resolve_motions(&body);
         let loads = Loads::new(&body, &scene, &mut conditions);
         let (points, values) = (&body.nodes.points, loads.values_at(scene.start()));
@@ -108,7 +109,7 @@ impl DiscreteProblem {
             })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(&conditions.rows);
-        let supports = Supports::new(&scene, &body, &conditions);
+        let supports = Supports::new(&scene, &body, &conditions, &lines);
         let norms = (scene.sample_times(notes::TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());

@@ -10,7 +10,7 @@
 
 use super::DiscreteProblem;
 use crate::{
-    mesh::{CORNER_ANGLE, Mesh},
+    mesh::Lines,
     scene::{Boundary, Condition},
 };
 use nalgebra::{Complex, Matrix2x4, Matrix3, Matrix4};
@@ -36,10 +36,6 @@ type Support<'a> = (&'a Condition, &'a Boundary);
 const LAMBDA: [f64; 3] = [0.03, 0.975, 1.5];
 /// Number of parts of each side of this rectangle.
 const PARTS: usize = 48;
-/// A line that turns by less than this angle at a node, rad, is straight; by more than the other one, it has a corner.
-const STRAIGHT: f64 = PI / 90.0;
-const CORNER: f64 = PI / 3.0 + 0.01;
-
 /// Are stresses singular where sectors (stiffness and angle, rad) meet, with conditions on two sides, or inside the body?
 /// Along half the border of the rectangle the argument of the determinant changes by π times the number of its roots.
 fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2]>) -> bool {
@@ -94,45 +90,18 @@ fn conditions(support: Option<&Support>, angle: f64) -> (u8, Vec<Matrix2x4<f64>>
     }
 }
 
-/// The lines of a mesh: the boundary and the interfaces of materials.
-struct Lines<'a> {
-    mesh: &'a Mesh,
+/// The lines of a mesh and the triangles at their nodes.
+struct Wedges<'a> {
+    lines: Lines<'a>,
     /// By the side ab of a triangle abc with a on a line: the node c and the stiffness.
     next: HashMap<[usize; 2], (usize, Matrix3<f64>)>,
-    /// Per node on a line: the other ends of its edges on lines.
-    ends: BTreeMap<usize, Vec<usize>>,
 }
 
-impl Lines<'_> {
-    /// The angle, rad, at which the chord ab leaves a.
-    fn chord(&self, a: usize, b: usize) -> f64 {
-        let [x, y] = self.mesh.direction(a, b);
-        y.atan2(x)
-    }
-
-    /// The share |ab|/(|ab| + |bc|) of the edge ab in the turn at b of the line abc, rad; `None` at a corner or a fork.
-    fn turn(&self, a: usize, b: usize) -> Option<f64> {
-        let &[p, q] = &self.ends[&b][..] else { return None };
-        let c = if p == a { q } else { p };
-        let turn = wrapped(self.chord(b, c) - self.chord(b, a) - PI);
-        let [ab, bc] = [a, c].map(|end| self.mesh.edge_normal([b, end]).1);
-        (turn.abs() <= CORNER).then_some(turn * ab / (ab + bc))
-    }
-
-    /// The angle, rad, at which a curve with the chord ab leaves a: exact for circles. If b is a corner, the turn at a counts.
+impl Wedges<'_> {
+    /// The angle, rad, at which the line with the edge ab leaves a.
     fn tangent(&self, a: usize, b: usize) -> f64 {
-        let is_line = self.ends[&a].contains(&b);
-        let turn = || self.turn(a, b).or_else(|| Some(-self.turn(b, a)?));
-        self.chord(a, b) - Some(is_line).filter(|is| *is).and_then(|_| turn()).unwrap_or(0.0)
-    }
-
-    /// Is a line smooth at a node? A curve turns by as much at the neighbours, so that its tangents do not turn.
-    fn is_smooth(&self, node: usize, straight: f64) -> bool {
-        let &[p, q] = &self.ends[&node][..] else { return false };
-        let chords = wrapped(self.chord(node, p) - self.chord(node, q) - PI);
-        let tangents = wrapped(self.tangent(node, p) - self.tangent(node, q) - PI);
-        let is_curve = tangents * chords.signum() <= 0.4 * chords.abs();
-        chords.abs() <= straight + 1e-9 || (is_curve && chords.abs() <= CORNER)
+        let [x, y] = self.lines.tangent(a, b);
+        y.atan2(x)
     }
 
     /// The sectors counter-clockwise from the edge to `first`, and the end of the last edge.
@@ -161,69 +130,55 @@ fn wrapped(angle: f64) -> f64 {
 impl DiscreteProblem {
     /// The points of the whole body with singular stresses.
     pub fn singular_points(&self) -> Vec<Singular> {
-        let (lines, supports) = (self.lines(), self.supports_of_edges());
-        let is_side = |edge: [usize; 2]| lines.next.contains_key(&edge);
-        let wedges = lines.ends.iter().flat_map(|(&node, ends)| {
+        let (wedges, supports) = (self.wedges(), self.supports_of_edges());
+        let is_side = |edge: [usize; 2]| wedges.next.contains_key(&edge);
+        let first = wedges.lines.ends.iter().flat_map(|(&node, ends)| {
             let is_first = move |end: &usize| is_side([node, *end]) && !is_side([*end, node]);
             let is_inside = ends.iter().all(|&end| is_side([node, end]) && is_side([end, node]));
             let first = ends.iter().copied().filter(is_first);
             first.chain(is_inside.then_some(ends[0])).map(move |first| [node, first])
         });
-        wedges.filter_map(|edge| self.singular(&lines, &supports, edge)).collect()
+        first.filter_map(|edge| self.singular(&wedges, &supports, edge)).collect()
     }
 
-    /// The lines of the mesh.
-    fn lines(&self) -> Lines<'_> {
-        let (mesh, mut next, mut ends) = (self.mesh(), HashMap::default(), BTreeMap::new());
+    /// The lines of the mesh with its wedges.
+    fn wedges(&self) -> Wedges<'_> {
+        let (mesh, mut next) = (self.mesh(), HashMap::default());
         let stiffness: Vec<_> = self.scene().materials().map(|of| of.stiffness()).collect();
         let numbers = self.scene().materials_of(mesh);
-        let mut on_line = vec![false; mesh.nodes.len()];
-        mesh.boundary_edges().iter().flatten().for_each(|&node| on_line[node] = true);
-        let mut first = vec![None; mesh.nodes.len()];
-        for (triangle, own) in mesh.triangles.iter().zip(&numbers) {
-            triangle.iter().for_each(|&p| on_line[p] |= first[p].get_or_insert(own) != &own);
-        }
+        let material = |t: usize| numbers.get(t).map_or(0, |&number| number as usize);
+        let lines = Lines::new(mesh, |t| stiffness[material(t)]);
         for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
-            let own = stiffness[numbers.get(t).map_or(0, |&number| number as usize)];
-            let sides =
-                [[a, b, c], [b, c, a], [c, a, b]].into_iter().filter(|side| on_line[side[0]]);
-            next.extend(sides.map(|[p, q, r]| ([p, q], (r, own))));
+            let sides = [[a, b, c], [b, c, a], [c, a, b]].into_iter();
+            let sides = sides.filter(|side| lines.ends.contains_key(&side[0]));
+            next.extend(sides.map(|[p, q, r]| ([p, q], (r, stiffness[material(t)]))));
         }
-        for (&[a, b], (_, own)) in next.iter().filter(|(edge, _)| on_line[edge[1]]) {
-            if next.get(&[b, a]).is_none_or(|(_, other)| a < b && own != other) {
-                ends.entry(a).or_insert_with(Vec::new).push(b);
-                ends.entry(b).or_insert_with(Vec::new).push(a);
-            }
-        }
-        Lines { mesh, next, ends }
+        Wedges { lines, next }
     }
 
     /// The singular point of the sectors at a node counter-clockwise from the edge to `first`.
     fn singular(
         &self,
-        lines: &Lines,
+        wedges: &Wedges,
         supports: &BTreeMap<[usize; 2], Support>,
         [node, first]: [usize; 2],
     ) -> Option<Singular> {
-        let (mut sectors, last) = lines.around(node, first);
+        let (sectors, last) = wedges.around(node, first);
         let sides = [[node, first], [last, node]].map(|edge| supports.get(&edge));
         let [(a, of_a), (b, of_b)] = [(sides[0], first), (sides[1], last)]
-            .map(|(side, end)| conditions(side, lines.tangent(node, end)));
+            .map(|(side, end)| conditions(side, wedges.tangent(node, end)));
         let (is_inside, slides) = (first == last, a.min(b) > 0 && a.max(b) < 3);
         let [p, q] = [&of_a, &of_b].map(|of| of[of.len() - 1]);
         let is_same = a == b && (p - q).norm().min((p + q).norm()) < 0.1;
-        // The contact joins normals.
-        let is_smooth = lines.is_smooth(node, if slides { CORNER_ANGLE } else { STRAIGHT });
+        let ends = &wedges.lines.ends[&node];
+        let is_smooth = matches!(ends[..], [p, q] if wedges.lines.is_smooth(node, [p, q]));
         let jumps = is_smooth && a == 1 && b == 1 && self.gap_jumps([last, node, first], sides);
         if is_smooth && is_same && !jumps {
             return None;
         }
-        if is_smooth {
-            sectors.iter_mut().for_each(|(_, angle)| *angle = PI);
-        }
         let mut cases = of_a.iter().flat_map(|a| of_b.iter().map(|b| [*a, *b]));
         let of = sides[usize::from(b > a)].map_or("", |(_, boundary)| &*boundary.name);
-        let lengths = lines.ends[&node].iter().map(|&end| lines.mesh.edge_normal([node, end]).1);
+        let lengths = ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1);
         let name = match sectors.len() {
             _ if is_inside => "a corner of an inclusion".to_owned(),
             2.. => "the end of an interface of two materials".to_owned(),
@@ -233,7 +188,7 @@ impl DiscreteProblem {
             _ => "a re-entrant corner".to_owned(),
         };
         let is_singular = cases.any(|sides| is_singular(&sectors, (!is_inside).then_some(sides)));
-        let (at, radius) = (lines.mesh.nodes[node], lengths.fold(0.0, f64::max));
+        let (at, radius) = (self.mesh().nodes[node], lengths.fold(0.0, f64::max));
         is_singular.then_some(Singular { at, radius, name })
     }
 

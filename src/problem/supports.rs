@@ -4,7 +4,7 @@ use super::{ContactLine, boundary_conditions::BoundaryConditions};
 use crate::{
     contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
-    mesh::{Face, sorted},
+    mesh::{Face, Lines, sorted},
     scene::{Boundary, Scene},
 };
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -36,28 +36,33 @@ struct NodeEdge {
 }
 
 impl Supports {
-    /// The supports of `scene` on the undivided `body`, with its `conditions`.
-    pub(super) fn new(scene: &Scene, body: &Body, conditions: &BoundaryConditions) -> Self {
+    /// The supports of `scene` on the undivided `body`, with its `conditions` and the lines of its boundary.
+    pub(super) fn new(
+        scene: &Scene,
+        body: &Body,
+        conditions: &BoundaryConditions,
+        lines: &Lines,
+    ) -> Self {
         let mut supports = Self { names: conditions.supports.clone(), ..Self::default() };
         for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
             supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
         }
+        let contact = scene.boundaries.iter().filter_map(|boundary @ Boundary { name, .. }| {
+            let number = supports.names.iter().position(|other| other == name)?;
+            let edges = body.edges(&body.mesh.curves.get(name)?.edges);
+            Some((number, &**name, boundary.gap()?, edges))
+        });
+        supports.contact = ContactLine::new(contact, &body.nodes.points, lines);
         let several = |of: &[(usize, [f64; 2])]| of.iter().any(|(number, _)| *number != of[0].0);
         let shared = supports.prescribed.iter().filter(|(_, of)| several(of));
         let shared: BTreeSet<usize> = shared.map(|(node, _)| *node).collect();
         let triangles = triangles_at(body, &shared);
-        for boundary @ Boundary { name, .. } in &scene.boundaries {
-            let number = supports.names.iter().position(|other| other == name);
+        for (number, name) in supports.names.iter().enumerate() {
             let curve = body.mesh.curves.get(name);
-            let (Some(number), Some(curve)) = (number, curve) else { continue };
-            let edges = body.edges(&curve.edges);
-            if let Some(gap) = boundary.gap() {
-                supports.contact.add((number, name), gap, &body.nodes.points, &edges);
-            }
-            for edge in &edges {
+            for edge in curve.iter().flat_map(|curve| body.edges(&curve.edges)) {
                 let Some(&triangle) = triangles.get(&sorted(edge.ends)) else { continue };
-                for (node, face) in edge.faces(&body.nodes.points) {
-                    let at = coordinates(&body.mesh.triangles[triangle], edge, node);
+                for (node, face) in edge.faces(&body.nodes.points, lines) {
+                    let at = coordinates(&body.mesh.triangles[triangle], &edge, node);
                     let of_node = NodeEdge { boundary: number, triangle, at, face };
                     supports.edges.entry(node).or_default().push(of_node);
                 }

@@ -9,7 +9,7 @@ use super::expression::Expression;
 use super::{Damage, Probe, Scene, may_start_at, rounded};
 use crate::{
     fem::{gauss_points, midpoint},
-    mesh::{CORNER_ANGLE, Curve, Mesh},
+    mesh::{Curve, Lines, Mesh},
     suggestion::suggestion,
 };
 
@@ -272,17 +272,10 @@ fn boundary_key(name: &str, key: &str) -> String {
 
 /// The end of a message about a mesh without physical curves: how to name them, and the corners between them.
 fn no_curves(mesh: &Mesh, name: &str) -> String {
-    let mut sides = BTreeMap::<usize, Vec<[f64; 2]>>::new();
-    for edge in mesh.boundary_edges() {
-        edge.iter().for_each(|node| sides.entry(*node).or_default().push(mesh.edge_normal(edge).0));
-    }
-    let is_corner = |normals: &[[f64; 2]]| match normals {
-        [a, b] => a[0] * b[0] + a[1] * b[1] < CORNER_ANGLE.cos(),
-        _ => true,
-    };
-    let corners = sides.iter().filter(|(_, normals)| is_corner(normals)).take(12);
+    let lines = Lines::boundary(mesh);
+    let corners = lines.ends.keys().filter(|&&node| lines.is_corner(node)).take(12);
     let corners =
-        corners.map(|(&node, _)| format!("({}, {})", mesh.nodes[node][0], mesh.nodes[node][1]));
+        corners.map(|&node| format!("({}, {})", mesh.nodes[node][0], mesh.nodes[node][1]));
     format!(
         ", which has none: name each in the .geo, as in Physical Curve(\"{name}\") = {{1}}; the boundary has \
          corners at {}",

@@ -94,3 +94,37 @@ fn a_body_that_widens_upwards_turns_over_its_base_and_others_stand() {
     let standing = scene(mesh(), "0.01", &top("traction = [0, '-1 - t*(x - 1)']"));
     assert!(standing.collapse.is_none());
 }
+
+/// A body of the weight 2 on a floor and a ramp, which hold the horizontal force 4t tan α until t = ½. Few nodes are enough
+/// if the mesh has the points of the geometry.
+#[test]
+fn a_ramp_holds_a_body_until_it_slides_whatever_its_angle() {
+    for degrees in [2.0_f64, 5.0, 10.0, 20.0, 29.0, 31.0, 60.0] {
+        for (n, is_known) in [(1, true), (2, true), (3, true), (5, true), (3, false), (5, false)] {
+            let slope = degrees.to_radians().tan();
+            let mut mesh = Mesh::rectangle(2.0, 1.0, 2 * n, n);
+            let is_point =
+                |&node: &usize| mesh.nodes[node][1] == 0.0 && mesh.nodes[node][0].fract() == 0.0;
+            if is_known {
+                mesh.points = (0..mesh.nodes.len()).filter(is_point).collect();
+            } else if degrees == 2.0 {
+                // The limit of lines of which the points are not known.
+                continue;
+            }
+            let mesh = moved(mesh, |[x, y]| [x, y + slope * (x - 1.0).max(0.0)]);
+            let ramp = scene(
+                mesh,
+                "0.1",
+                &format!(
+                    "body.force = [0, -1]
+                     boundary = [
+                        {{ name = 'bottom', gap = 0 }},
+                        {{ name = 'right', traction = ['{}*t', 0] }},
+                     ]",
+                    4.0 * slope
+                ),
+            );
+            check(&ramp, 0.5, "the translation along");
+        }
+    }
+}

@@ -191,11 +191,13 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
 
 #[test]
 fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
-    // Two normals 2α apart at one node: below 30° their length-weighted mean and the
-    // smaller gap, above it both.
-    for (half, bounds) in [(0.2_f64, 1), (0.3, 2)] {
+    // Two normals 2α apart at one node: on a smooth line their length-weighted mean and the smaller gap, in a corner both.
+    for (half, bounds) in [(0.01_f64, 1), (0.01, 2), (0.2, 1), (0.2, 2), (0.3, 1), (0.3, 2)] {
         let normal = |side: f64| [side * half.sin(), -half.cos()];
-        let face = |side, gap: f64| (0, Face { normal: normal(side), length: 2.0 }, gap);
+        let of_line = |side| if bounds == 1 { [0.0, -2.0] } else { normal(side) };
+        let face = |side, gap: f64| {
+            (0, Face { of_line: of_line(side), ..Face::plane(normal(side), 2.0) }, gap)
+        };
         let joined = joined_faces([face(-1.0, 0.1), face(1.0, 0.2)]).remove(&0).unwrap();
         let row = |(face, gaps): (Face, Vec<f64>)| {
             let tributary_length = Some(face.length);

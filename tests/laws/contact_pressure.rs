@@ -1,11 +1,12 @@
 //! The contact pressure as a field on Γ_C: uniform and linear pressures keep their values, the area under it is the
 //! force of each foundation.
 
+use crate::bore::disc;
 use crate::support::{close_to, distorted, moved, problem, run, shipped, square, turn, with_part};
 use signorini::{
     contact::SOLVERS,
     evolution::{ContactRow, DiscreteProblem, State},
-    mesh::Mesh,
+    mesh::{Curve, Mesh},
 };
 
 /// The rows of Γ_C by boundary and part.
@@ -159,5 +160,87 @@ fn a_foundation_has_its_length_its_ends_and_its_line_of_action() {
             assert!((value("contact_length") - value("contact_end_x")).abs() < 2e-4);
             assert!(value("contact_start_x").abs() < 1e-12 && value("peak_x") < 1e-3);
         }
+    }
+}
+
+/// The figures of contact of a body in a closed foundation, whose list of edges begins with the edge `first`.
+fn closed_figures(mut mesh: Mesh, text: &str, first: usize) -> Vec<f64> {
+    mesh.curves.get_mut("rim0").unwrap().edges.rotate_left(first);
+    let problem = problem(mesh, text).unwrap_or_else(|e| panic!("{e}"));
+    problem.contact_figures(&run(&problem, SOLVERS[0]).last.state)
+}
+
+#[test]
+fn the_figures_of_a_closed_foundation_turn_with_the_load_wherever_its_edges_begin() {
+    const CENTRE: [f64; 2] = [3.0, 2.0];
+    for degree in [1, 2] {
+        let text = |angle: f64, gap: f64| {
+            let force = turn(angle, [0.0, -1.0]);
+            format!(
+                "contact.tolerance = 1e-12
+                 discretisation.displacement = {degree}
+                 material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+                 body.force = {force:?}
+                 boundary = [{{ name = 'rim0', gap = {gap} }}]"
+            )
+        };
+        let mut expected = Vec::new();
+        for k in (0..24).step_by(5) {
+            // The mesh of the disc is the same after a turn by 15°.
+            let angle = f64::from(k) * std::f64::consts::TAU / 24.0;
+            let mut found =
+                closed_figures(disc(24, 0.0, 1), &text(angle, 0.2), (7 * k % 24) as usize);
+            for place in found[2..].chunks_mut(2) {
+                let [x, y] = turn(-angle, [place[0] - CENTRE[0], place[1] - CENTRE[1]]);
+                place.copy_from_slice(&[x, y]);
+            }
+            let [length, _, _, start_y, _, end_y, .., acts_at_y] = found[..] else { panic!() };
+            assert!(
+                length > 0.2 && length < 2.0 && start_y < -0.5 && end_y < -0.5 && acts_at_y < -0.7
+            );
+            assert!(
+                found[2] < 0.0 && found[4] > 0.0,
+                "the body is on the left of the way from start to end"
+            );
+            expected = if k == 0 { found.clone() } else { expected };
+            let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+            assert!(
+                apart.fold(0.0, f64::max) < 1e-7,
+                "P{degree}, turn {k}: {found:?}, {expected:?}"
+            );
+        }
+        // A press fit: all nodes are active, and contact begins and ends at the least pressure, on the side of the body
+        // force.
+        for first in [0, 6, 17] {
+            let found = closed_figures(disc(24, 0.0, 1), &text(0.0, -0.05), first);
+            let rim = 48.0 * (std::f64::consts::TAU / 48.0).sin();
+            assert!((found[0] / rim - 1.0).abs() < 2e-3, "P{degree}: {} of {rim}", found[0]);
+            assert_eq!(found[2..4], found[4..6]);
+            assert!(
+                found[3] > CENTRE[1] + 0.9 && found[7] < CENTRE[1] - 0.9,
+                "P{degree}: {found:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn contact_around_a_corner_of_a_closed_foundation_has_the_same_figures_wherever_its_edges_begin() {
+    let mut mesh = square(4);
+    let sides = ["bottom", "right", "top", "left"];
+    let edges = sides.iter().flat_map(|side| mesh.curves[*side].edges.clone()).collect();
+    mesh.curves.insert("rim0".to_owned(), Curve { edges, other_edges: 0 });
+    let text = "contact.tolerance = 1e-12
+                material = { young = 100, poisson = 0.3, plane = 'stress' }
+                body.force = [1, -1.3]
+                boundary = [{ name = 'rim0', gap = 0.01 }]";
+    let expected = closed_figures(mesh.clone(), text, 0);
+    // The bottom and the right side bear the square.
+    close_to(expected[0], 2.0, 1e-9);
+    assert_eq!(expected[2..6], [0.0, 0.0, 1.0, 1.0]);
+    for first in 1..16 {
+        let found = closed_figures(mesh.clone(), text, first);
+        let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f64::max) < 1e-7, "edge {first}: {found:?}, {expected:?}");
     }
 }

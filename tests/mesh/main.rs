@@ -6,14 +6,14 @@ mod common;
 
 use signorini::{
     fem::Edge,
-    mesh::{BoundaryNode, Mesh},
+    mesh::{BoundaryNode, Lines, Mesh},
 };
 
 /// The nodes of straight boundary edges.
 fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
+    let lines = Lines::boundary(mesh);
     let edges = edges.iter().map(|&ends| Edge { ends, middle: None });
-    let faces: Vec<_> =
-        edges.flat_map(|edge| edge.faces(&mesh.nodes).collect::<Vec<_>>()).collect();
+    let faces = edges.flat_map(|edge| edge.faces(&mesh.nodes, &lines).collect::<Vec<_>>());
     signorini::mesh::boundary_nodes(faces)
 }
 

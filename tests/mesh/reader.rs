@@ -42,6 +42,7 @@ fn sorted(mesh: Mesh) -> Mesh {
         nodes: order.iter().map(|&old| mesh.nodes[old]).collect(),
         surfaces: mesh.surfaces.iter().map(surface).collect(),
         curves: mesh.curves.iter().map(curve).collect(),
+        points: mesh.points.iter().map(|&node| number[node]).collect(),
         curved: mesh.curved.iter().map(midpoint).collect(),
         triangles,
         gmsh: mesh.gmsh,
@@ -92,8 +93,10 @@ fn every_form_gives_the_same_mesh() {
             for (p, q) in mesh.nodes.iter().flatten().zip(other.nodes.iter().flatten()) {
                 assert!((p - q).abs() < 1e-15, "{writer}-{form}: {p} is not {q}");
             }
-            let other = Mesh { nodes: mesh.nodes.clone(), ..other };
-            assert!(mesh == other, "{writer}-{form}");
+            // Only MSH 4 names the points of the geometry.
+            let points = if form.starts_with("22") { &mesh.points } else { &other.points }.clone();
+            let other = Mesh { nodes: mesh.nodes.clone(), points, ..other };
+            assert!(mesh == other && !mesh.points.is_empty(), "{writer}-{form}");
         }
     }
 }

@@ -53,9 +53,10 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
     }
     one_body::check(&nodes, &triangles, &sides)?;
     let curves = curves(contents, &index, &sides);
+    let points = (0..listed.len()).filter(|&node| listed[node].is_point).collect();
     let notes = [ungrouped(contents, extent(&nodes)), slit::note(&nodes, &boundary_edges(&sides))];
     let notes = notes.into_iter().flatten().collect();
-    let mut mesh = Mesh { nodes, triangles, curves, surfaces, notes, ..Mesh::default() };
+    let mut mesh = Mesh { nodes, triangles, curves, surfaces, points, notes, ..Mesh::default() };
     if !contents.midpoints.is_empty() {
         set_midpoints(&mut mesh, contents, &elements, &index, plane)?;
         mesh.curved.retain(|edge, _| !removed.contains(edge));
@@ -65,7 +66,7 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
 
 /// Checks that a node lies in the plane of the body, up to a tolerance.
 fn check_planar(
-    &Node { tag, point: [.., z], at }: &Node,
+    &Node { tag, point: [.., z], at, .. }: &Node,
     [plane, tolerance]: [f64; 2],
 ) -> Result<()> {
     match (z - plane).abs() > tolerance {

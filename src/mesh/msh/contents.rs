@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 pub struct Node {
     pub tag: u64,
     pub point: [f64; 3],
+    /// Is it a point of the geometry?
+    pub is_point: bool,
     /// The byte where it is listed, for messages.
     pub at: usize,
 }
@@ -48,8 +50,13 @@ impl Contents {
         self.names.get(&(dimension, group)).cloned().unwrap_or_else(|| group.to_string())
     }
 
-    /// Reads the coordinates of the node `tag`.
-    pub fn read_node(&mut self, reader: &mut ByteReader, tag: u64, at: usize) -> Result<()> {
+    /// Reads the coordinates of the node `tag`, which is listed at byte `at`.
+    pub fn read_node(
+        &mut self,
+        reader: &mut ByteReader,
+        (tag, at): (u64, usize),
+        is_point: bool,
+    ) -> Result<()> {
         let mut point = [0.0; 3];
         for coordinate in &mut point {
             *coordinate = reader.real("a number")?;
@@ -57,7 +64,7 @@ impl Contents {
         if point.iter().any(|x| !x.is_finite()) {
             return error_at(at, format!("a coordinate of node {tag} is not a finite number"));
         }
-        self.nodes.push(Node { tag, point, at });
+        self.nodes.push(Node { tag, point, is_point, at });
         Ok(())
     }
 

@@ -39,12 +39,14 @@ pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
         let dimension = reader.int("a dimension")?;
         reader.int("an entity tag")?;
         let parametric = reader.int("0 or 1 (parametric nodes)")? != 0;
+        // A converted file lacks the points that are in no physical group.
+        let is_point = dimension == 0 && !contents.groups_are_entities;
         let mut tags = Vec::new();
         for _ in 0..reader.size("a count")? {
             tags.push((reader.position(), reader.size("a node tag")?));
         }
         for (at, tag) in tags {
-            contents.read_node(reader, tag, at)?;
+            contents.read_node(reader, (tag, at), is_point)?;
             // A parametric node has one more number per dimension of its entity.
             for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
                 reader.real("a number")?;

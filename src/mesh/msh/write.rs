@@ -9,7 +9,7 @@ const TRIANGLES: [u8; 2] = [2, 9];
 
 impl Mesh {
     /// The text of an MSH file. If any edge is curved, all elements are of second order. Each curve is an
-    /// entity, and so is each combination of surfaces that triangles belong to.
+    /// entity, and so are each combination of surfaces that triangles belong to and each point of the geometry.
     pub fn to_msh(&self) -> String {
         let midpoints = if self.curved.is_empty() { Vec::new() } else { self.midpoints() };
         let surfaces: Vec<(&str, Vec<usize>)> = match self.surfaces.is_empty() {
@@ -38,17 +38,33 @@ impl Mesh {
         let lines: String = (1..=self.curves.len()).map(|tag| entity(tag, &[tag])).collect();
         let faces: String = entities.iter().map(|(groups, &tag)| entity(tag, groups)).collect();
 
-        let count = self.nodes.len() + midpoints.len();
+        let at = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
+        let at: Vec<String> = at.map(|[x, y]| format!("{x} {y} 0")).collect();
+        // Nodes keep their order. Each block: dimension, entity, first node and the node after the last one.
+        let (mut corners, mut blocks, mut next) = (String::new(), Vec::new(), 0);
+        for (tag, &node) in (1..).zip(&self.points) {
+            corners += &format!("{tag} {} 0\n", at[node]);
+            blocks.extend([[2, 1, next, node], [0, tag, node, node + 1]]);
+            next = node + 1;
+        }
+        blocks.push([2, 1, next, at.len()]);
+        blocks.retain(|[.., first, end]| first < end);
+
         let mut text = format!(
             "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n{names}$EndPhysicalNames\n\
-             $Entities\n0 {} {} 0\n{lines}{faces}$EndEntities\n$Nodes\n1 {count} 1 {count}\n2 1 0 {count}\n",
+             $Entities\n{} {} {} 0\n{corners}{lines}{faces}$EndEntities\n$Nodes\n{} {count} 1 {count}\n",
             self.curves.len() + surfaces.len(),
+            self.points.len(),
             self.curves.len(),
             entities.len(),
+            blocks.len(),
+            count = at.len(),
         );
-        (1..=count).for_each(|tag| text += &format!("{tag}\n"));
-        let points = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));
-        points.for_each(|[x, y]| text += &format!("{x} {y} 0\n"));
+        for [dimension, entity, first, end] in blocks {
+            text += &format!("{dimension} {entity} 0 {}\n", end - first);
+            (first..end).for_each(|node| text += &format!("{}\n", node + 1));
+            at[first..end].iter().for_each(|at| text += &format!("{at}\n"));
+        }
         let gmsh =
             self.gmsh.iter().map(|version| format!("$Comments\ngmsh {version}\n$EndComments\n"));
         text +=

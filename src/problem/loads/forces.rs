@@ -130,7 +130,7 @@ fn smooth_halves(edges: &[Edge], points: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
         let [x, y] = edge.tangent(points, s);
         let length = x.hypot(y);
         let weight = if edge.middle.is_some() { length * length } else { length };
-        (length, Face { normal: [y / length, -x / length], length: weight })
+        (length, Face::plane([y / length, -x / length], weight))
     };
     let mut faces = BTreeMap::<usize, Vec<(usize, Face)>>::new();
     for (number, edge) in edges.iter().enumerate() {
