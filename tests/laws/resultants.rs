@@ -48,6 +48,8 @@ fn forces_that_balance_have_a_scale_and_need_no_finer_mesh() {
     };
     let moves = "= 0.3 }\nboundary = [{ name = 'left', displacement = [1, 2] },
                  { name = 'right', displacement = [1, 2] }]";
+    let turns = "= 0.3 }\nprobe = [{ name = 'p', point = [0.5, 0.9] }]
+                 boundary = [{ name = 'left', displacement = ['-1e-3*y', '1e-3*x'] }]";
     let slides =
         "= 0 }\nboundary = [{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
                   { name = 'top', symmetry = true }, { name = 'right', traction = [1, 0] }]";
@@ -57,6 +59,7 @@ fn forces_that_balance_have_a_scale_and_need_no_finer_mesh() {
         (bar(0.4), bend(0.4)),
         (bar(2.0), bend(2.0)),
         (unstructured(0.2), moves.to_owned()),
+        (unstructured(0.2), turns.to_owned()),
         (unstructured(0.2), slides.to_owned()),
     ];
     for (mesh, text) in bodies {
@@ -67,10 +70,11 @@ fn forces_that_balance_have_a_scale_and_need_no_finer_mesh() {
         for bar in found.measured.bars {
             assert!(bar.bar <= 1e-6 * bar.scale, "{bar:?}\n{text}");
         }
-        // The resultant of each side is rounding, or as large as the load.
+        // The resultant of each side, and the stress at the probe, are rounding or as large as the load.
         let problem = DiscreteProblem::new(scene, mesh).unwrap();
         for (name, value) in figures(&problem) {
-            let is_force = name.contains(".force") || name.contains("pressure");
+            let is_force =
+                [".force", "pressure", "stress", "mises"].iter().any(|of| name.contains(of));
             assert!(!is_force || value == 0.0 || value.abs() > 1e-3, "{name} {value:e}\n{text}");
         }
     }

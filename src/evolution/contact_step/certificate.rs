@@ -25,7 +25,7 @@ pub(super) struct Candidate {
     /// The larger of Σ|f| and Σ|Ku| over all components, N per metre of thickness: the scale of resultants. It does not
     /// depend on the mesh, and does not vanish where forces balance.
     pub(super) forces: f64,
-    /// Forces up to this are rounding, N per metre of thickness: Σ|Ku| if the body only moves rigidly, without load.
+    /// Forces up to this are rounding, N per metre of thickness: all of them if the body only moves rigidly, without load.
     pub(super) rounding: f64,
     /// The cosine between u and its elastic forces: the sign of the energy.
     energy: f64,
@@ -65,7 +65,10 @@ impl ContactStep<'_> {
         let force = sums[0].max(sums[1]).sqrt();
         let [.., load, internal] = sums;
         let is_rigid = elastic_max <= self.reference_rounding().max(ROUNDING * rigid_max);
-        let rounding = if is_rigid && load == 0.0 { internal } else { 0.0 };
+        let [forces, rounding] = match is_rigid && load == 0.0 {
+            true => [0.0, f64::INFINITY],
+            false => [load.max(internal), 0.0],
+        };
         let scales = self.run_scales(Scales { force, displacement: elastic_max });
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer = Answer {
@@ -85,7 +88,7 @@ impl ContactStep<'_> {
             kkt,
             scales,
             force,
-            forces: load.max(internal - rounding),
+            forces,
             rounding,
             energy,
             unbalanced,
