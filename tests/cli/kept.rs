@@ -103,7 +103,9 @@ fn no_two_meshes_have_one_name() {
         for (parameters, out, mesh, path) in all {
             let (count, said) = meshes(&together, parameters);
             assert_eq!((count, &said.out), (expected, out), "{parameters}");
-            assert_eq!(&together.0.read(path), mesh, "{parameters}");
+            // The signature also names the gmsh of each folder.
+            let made = |kept: &str| kept[..kept.rfind("$Comments").unwrap()].to_owned();
+            assert_eq!(made(&together.0.read(path)), made(mesh), "{parameters}");
         }
     }
     assert_eq!(together.meshes().len(), all.len());

@@ -64,7 +64,7 @@ pub(super) fn bars(
             }
             // A change within the open parts is no error beyond them.
             Dimension::ContactLength => {
-                let open = coarse.open() * bar.scale;
+                let open = coarse.open_length();
                 open + (bar.bar - factor * open).max(0.0)
             }
             _ => bar.bar,

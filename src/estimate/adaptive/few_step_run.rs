@@ -136,12 +136,15 @@ impl<'a> FewStepRun<'a> {
         &self.history.extremes
     }
 
-    /// The part of Γ_C on which the ends of contact may lie: half of an edge for each end, over the largest length of
-    /// contact.
-    pub(super) fn open(&self) -> f64 {
+    /// The length of the part of Γ_C on which the ends of contact may lie, m: half of an edge for each end.
+    pub(super) fn open_length(&self) -> f64 {
         let half = |[[ax, ay], [bx, by]]: &[[f64; 2]; 2]| 0.5 * (bx - ax).hypot(by - ay);
-        let open: f64 = self.extremes().ends.iter().map(half).sum();
-        let length = self.extremes().of_points.len();
+        self.extremes().ends.iter().map(half).sum()
+    }
+
+    /// This length over the largest length of contact.
+    pub(super) fn open(&self) -> f64 {
+        let (open, length) = (self.open_length(), self.extremes().of_points.len());
         if open > 0.0 { open / self.history.sizes_of_extremes[length] } else { 0.0 }
     }
 

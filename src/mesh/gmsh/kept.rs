@@ -1,8 +1,9 @@
 //! The mesh of a `.geo`, kept in a file beside it for later runs.
 //!
-//! A kept file ends with a comment of two digests: of all inputs from which gmsh made the mesh, and of the
-//! file before this comment. A mesh is read again if the first digest is that of the present inputs. A file
-//! is replaced only if the second one is right: then this program wrote it, and nobody has changed it.
+//! A kept file ends with a comment of three digests: of all inputs from which gmsh made the mesh, of the gmsh that
+//! made it, and of the file before this comment. A mesh is read again if the first digest is that of the present
+//! inputs, and gmsh is the same program or has the same version. A file is replaced only if the third digest is
+//! right: then this program wrote it, and nobody has changed it.
 
 use sha2::{Digest, Sha256};
 use std::{
@@ -12,7 +13,6 @@ use std::{
     iter::once,
     path::{Path, PathBuf},
     process::Command,
-    sync::LazyLock,
 };
 
 /// Commands and options of a `.geo` that read the file of the name that follows in quotes. (An unquoted name
@@ -74,27 +74,37 @@ fn digest(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The comment after a mesh from inputs of this digest.
-pub fn signature(mesh: &[u8], inputs: &str) -> String {
-    format!("$Comments\ninputs {inputs}, mesh {}\n$EndComments\n", digest(mesh))
+/// The comment after a mesh that this gmsh made from inputs of this digest.
+pub fn signature(mesh: &[u8], [inputs, gmsh]: [&str; 2]) -> String {
+    format!("$Comments\ninputs {inputs}, gmsh {gmsh}, mesh {}\n$EndComments\n", digest(mesh))
 }
 
-/// The digest of the inputs of a kept mesh; `None` for any other file.
-pub fn inputs_of(file: &[u8]) -> Option<&str> {
-    let start = file.len().checked_sub(signature(b"", &digest(b"")).len())?;
+/// The digests of the inputs and of the gmsh of a kept mesh; `None` for any other file.
+pub fn origin(file: &[u8]) -> Option<[&str; 2]> {
+    let none = digest(b"");
+    let start = file.len().checked_sub(signature(b"", [&none, &none]).len())?;
     let (mesh, end) = file.split_at(start);
-    let inputs = str::from_utf8(end).ok()?.strip_prefix("$Comments\ninputs ")?.split(',').next()?;
-    (signature(mesh, inputs).as_bytes() == end).then_some(inputs)
+    let rest = str::from_utf8(end).ok()?.strip_prefix("$Comments\ninputs ")?;
+    let (inputs, rest) = rest.split_once(", gmsh ")?;
+    let origin = [inputs, rest.split(',').next()?];
+    (signature(mesh, origin).as_bytes() == end).then_some(origin)
+}
+
+/// The digest of the path, the length and the time of the installed gmsh, if there is one. Asking it for its version
+/// takes as long as a small mesh.
+pub fn program() -> Option<String> {
+    let paths = env::var_os("PATH")?;
+    let program = env::split_paths(&paths).map(|folder| folder.join("gmsh")).find(|p| p.is_file());
+    let program = fs::canonicalize(program?).ok()?;
+    let data = fs::metadata(&program).ok()?;
+    let identity = format!("{program:?} {} {:?}", data.len(), data.modified().ok()?);
+    Some(digest(identity.as_bytes()))
 }
 
 /// The version of the installed gmsh, if there is one.
-pub fn installed() -> Option<&'static str> {
-    static VERSION: LazyLock<Option<String>> = LazyLock::new(|| {
-        let said = Command::new("gmsh").arg("--version").output().ok()?;
-        // Some versions write it to stdout, others to stderr. A development version goes on with "-git".
-        let said = [said.stdout, said.stderr].concat();
-        let version = String::from_utf8_lossy(&said).trim().split('-').next()?.to_owned();
-        Some(version)
-    });
-    VERSION.as_deref()
+pub fn version() -> Option<String> {
+    let said = Command::new("gmsh").arg("--version").output().ok()?;
+    // Some versions write it to stdout, others to stderr. A development version goes on with "-git".
+    let said = [said.stdout, said.stderr].concat();
+    Some(String::from_utf8_lossy(&said).trim().split('-').next()?.to_owned())
 }

@@ -102,21 +102,24 @@ fn mesh_geo(
     let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
     let digest = inputs.digest(&arguments, &last);
     let kept = fs::read(&path);
-    let made_from = kept.as_ref().ok().and_then(|file| kept::inputs_of(file));
-    if let Ok(file) = &kept
-        && made_from == Some(&digest)
+    let gmsh = kept::program();
+    let origin = kept.as_ref().ok().and_then(|file| kept::origin(file));
+    if let (Ok(file), Some([made_from, made_by])) = (&kept, origin)
+        && made_from == digest
         && inputs.are_all
     {
         let mesh = parse(file, &path)?;
-        if kept::installed().is_none_or(|version| mesh.gmsh.as_deref() == Some(version)) {
+        let is_same = gmsh.as_ref().is_none_or(|gmsh| gmsh == made_by);
+        if is_same || kept::version().is_none_or(|version| mesh.gmsh == Some(version)) {
             return Ok(mesh);
         }
     }
     let bytes = run((geo, None), arguments, &last, "mesh it")?;
     let mesh = parse_made(&bytes, geo)?;
     let is_free = fs::symlink_metadata(&path).is_err();
-    if is_free || made_from.is_some() {
-        let signed = [&bytes, kept::signature(&bytes, &digest).as_bytes()].concat();
+    if is_free || origin.is_some() {
+        let origin = [&*digest, &gmsh.unwrap_or_default()];
+        let signed = [&bytes, kept::signature(&bytes, origin).as_bytes()].concat();
         if let Err(error) = whole_file::write(&path, &signed, |_| Ok(())) {
             note(&path, &format!("it cannot be written ({error}), so that every run meshes anew"));
         }
