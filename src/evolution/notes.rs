@@ -49,11 +49,13 @@ impl Outcome {
             }),
             self.penetration.clone(),
         ];
-        let (moved, size) = (self.last.record.displacement_max, extent(&problem.mesh().nodes));
+        let [moved, most] =
+            [&self.last, self.most_displaced()].map(|step| step.record.displacement_max);
+        let size = extent(&problem.mesh().nodes);
         let has_gaps = problem.scene().boundaries.iter().any(|boundary| boundary.gap().is_some());
         let of_model = [
-            (moved == 0.0 && has_gaps).then(|| {
-                "nothing moves at the end: no load acts and no foundation presses; check their signs".to_owned()
+            (most == 0.0 && has_gaps).then(|| {
+                "nothing moves: no load acts and no foundation presses; check their signs".to_owned()
             }),
             (moved > size).then(|| {
                 let times = moved / size;

@@ -107,10 +107,22 @@ fn what_the_nodes_miss_of_a_displacement_or_the_initial_damage_is_noted() {
 }
 
 #[test]
-fn an_answer_without_any_motion_is_noted() {
-    let problem = pressed(1.0, "0").unwrap();
-    let notes = run(&problem, SOLVERS[0]).notes(&problem);
-    assert!(notes.len() == 1 && notes[0].starts_with("nothing moves at the end"), "{notes:?}");
+fn an_answer_without_any_motion_is_noted_and_the_end_of_a_cycle_is_not() {
+    let in_time = |load: &str| {
+        let text = format!(
+            "{MATERIAL}
+             time = {{ end = 1, step = 0.25 }}
+             boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
+                         {{ name = 'top', traction = [0, '{load}'] }}]"
+        );
+        problem(square(4), &text).unwrap()
+    };
+    let notes = |problem: DiscreteProblem| run(&problem, SOLVERS[0]).notes(&problem);
+    for still in [pressed(1.0, "0").unwrap(), in_time("0")] {
+        let notes = notes(still);
+        assert!(notes.len() == 1 && notes[0].starts_with("nothing moves:"), "{notes:?}");
+    }
+    assert_eq!(notes(in_time("-min(t, 1 - t)")), [""; 0]);
 }
 
 #[test]
