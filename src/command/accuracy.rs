@@ -58,7 +58,7 @@ pub(super) fn measure_errors(
 ) -> Result<Measured, Failure> {
     match estimate::measured_errors(session, scene, mesh, solver, of_steps) {
         Ok(measured) => Ok(measured),
-        Err(AdaptError::Setup(error)) => Err(Failure::input(error)),
+        // The scene fits this mesh, perhaps not the finer one.
         Err(error) => match error.signal() {
             Some(signal) => Err(interrupted(signal)),
             None => {
