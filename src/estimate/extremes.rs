@@ -4,7 +4,9 @@ use super::{Measured, NodalStress, principal, strained, stress::Point};
 use crate::{
     model::von_mises,
     petsc::{Communicator, PetscError},
-    problem::{Bar, ContactRow, DiscreteProblem, Singular, State, peak, rows_of, whole_and_parts},
+    problem::{
+        Bar, ContactRow, DiscreteProblem, SEEN, Singular, State, peak, rows_of, whole_and_parts,
+    },
 };
 use serde::Serialize;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -225,8 +227,6 @@ impl Extremes {
         /// The ratio of the last difference to the one before above which the extreme grows: halfway between that of
         /// r^½, as at an end of contact, and 1 for ln r.
         const INCREASING: f64 = 0.5 * (1.0 + FRAC_1_SQRT_2);
-        /// Smaller differences than this fraction of the extreme are rounding, or a weak singularity (λ > 0.97).
-        const SEEN: f64 = 0.02;
         let grows = |(extreme, field): (&Extreme, &Vec<(f64, [f64; 2])>)| {
             let size = size(extreme.at);
             let [a, b, c] = [0.5, 0.25, 0.125].map(|part| {

@@ -13,6 +13,10 @@ use super::{Mesh, SAME_DIRECTION, sides};
 use nalgebra::Complex;
 use std::{collections::BTreeMap, f64::consts::PI};
 
+/// Edges that turn by at most this angle, rad, may be chords of one curve, where the mesh does not say so. The tolerance
+/// protects edges that turn by exactly 30°.
+pub(crate) const CHORDS: f64 = PI / 6.0 + 1e-9;
+
 /// The lines of a mesh.
 pub struct Lines<'a> {
     mesh: &'a Mesh,
@@ -38,7 +42,7 @@ impl<'a> Lines<'a> {
             }
         }
         let (largest_turn, largest_kink) = match mesh.points.is_empty() {
-            true => (PI / 6.0 + 1e-9, PI / 90.0),
+            true => (CHORDS, PI / 90.0),
             false => (PI / 3.0 + 0.01, SAME_DIRECTION),
         };
         Self { mesh, largest_turn, largest_kink, ends }

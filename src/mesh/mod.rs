@@ -23,6 +23,7 @@ mod refine;
 pub use boundary::{BoundaryNode, Face, SAME_DIRECTION, boundary_nodes, joined_faces};
 pub use error::MeshError;
 pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
+pub(crate) use lines::CHORDS;
 pub use lines::Lines;
 pub use msh::{parse, read};
 pub use quadratic::Kink;

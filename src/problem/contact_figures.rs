@@ -5,7 +5,9 @@
 //! - The gap has a kink there. A wedge whose slope changes by Δ presses with (E Δ/2π) ln(2a/r) at the distance r from its
 //!   tip (Johnson, Contact Mechanics, 5.2), a the half length of contact. A bisection of the edges adds (E Δ/2π) ln 2.
 
-use super::{ContactRow, DiscreteProblem, Singular, State, contact_line::parts_from_open_nodes};
+use super::{
+    ContactRow, DiscreteProblem, SEEN, Singular, State, contact_line::parts_from_open_nodes,
+};
 use std::f64::consts::{LN_2, TAU};
 
 /// The first and the last active node with the body on the left (on a closed part from its longest stretch without contact),
@@ -44,8 +46,6 @@ impl DiscreteProblem {
 
     /// The peaks of the pressure by the `rows` of Γ_C that the mesh does not resolve, with the reason.
     pub(crate) fn unresolved_peaks(&self, rows: &[ContactRow]) -> Vec<Singular> {
-        /// If a bisection raises a peak by less than this fraction, the kink of the gap is negligible.
-        const SEEN: f64 = 0.02;
         // The rows of the next vertices; a corner has two rows and ends a line.
         let step = 1 + self.scene().order as usize;
         let is_next = |a: &ContactRow, b: &ContactRow| {

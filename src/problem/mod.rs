@@ -37,6 +37,7 @@ pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
 pub(crate) use notes::NOTED;
 pub(crate) use probe::OBSERVED;
+pub(crate) use singular::SEEN;
 pub use singular::Singular;
 pub use state::State;
 pub use supports::Supports;

@@ -32,7 +32,9 @@ pub struct Singular {
 /// A condition on an edge, and its boundary.
 type Support<'a> = (&'a Condition, &'a Boundary);
 
-/// Bounds of Re λ and |Im λ|. Above 0.975 a bisection raises the stress by less than 2 %; λ = 0 is a rigid motion.
+/// A bisection that raises an extreme by less than this fraction shows no singularity.
+pub(crate) const SEEN: f64 = 0.02;
+/// Bounds of Re λ and |Im λ|. Above 0.975 a bisection raises the stress by less than [`SEEN`]; λ = 0 is a rigid motion.
 const LAMBDA: [f64; 3] = [0.03, 0.975, 1.5];
 /// Number of parts of each side of this rectangle.
 const PARTS: usize = 48;

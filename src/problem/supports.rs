@@ -158,8 +158,9 @@ impl Supports {
         let parts: Vec<_> = numbers.into_iter().map(part).collect();
         let weights: Matrix2<f64> = parts.iter().map(|(.., weight)| weight).sum();
         let rest = force - parts.iter().map(|(_, own, _)| own).sum::<Vector2<f64>>();
-        let inverse = weights.pseudo_inverse(SINE * SINE * weights.trace());
-        let rest = inverse.expect("a positive tolerance") * rest;
+        // A negative tolerance would be an error.
+        let inverse = weights.pseudo_inverse(SINE * SINE * weights.trace()).unwrap_or_default();
+        let rest = inverse * rest;
         let exerted = parts.iter().map(|(number, own, weight)| (*number, own + weight * rest));
         let mut exerted: Vec<_> = exerted.collect();
         // Rounding across all directions.

@@ -4,7 +4,7 @@
 //!
 //! c(N) = c₁ + (c₁ − c₀)/(N₁ − N₀) (N − N₁), with c the peak memory of the process or the seconds of the run.
 //!
-//! Factors grow faster, but by less than the half of the memory and of the time that the rounds leave alone.
+//! Factors grow faster. So the rounds leave half of the free memory and of the time alone.
 
 use super::MAX_TRIANGLES;
 use crate::{memory, petsc::Communicator, scene::Scene};

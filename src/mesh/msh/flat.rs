@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 /// Twice the area over the square of the longest side: below this value a triangle is flat.
 const FLAT: f64 = 1e-10;
 /// The rounding error of a difference of coordinates, over their size.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
+const OF_COORDINATES: f64 = 4.0 * f64::EPSILON;
 
 /// The largest twice the area (m²) of a flat triangle with these vertices.
 pub fn bound([a, b, c]: [[f64; 2]; 3]) -> f64 {
     let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
     let longest = length(a, b).max(length(b, c)).max(length(c, a));
     let coordinate = [a, b, c].as_flattened().iter().fold(0.0_f64, |max, x| max.max(x.abs()));
-    longest * (FLAT * longest + ROUNDING * coordinate)
+    longest * (FLAT * longest + OF_COORDINATES * coordinate)
 }
 
 /// Gives area to flat triangles. At strong gradings gmsh makes such triangles of three consecutive nodes p, m, q on

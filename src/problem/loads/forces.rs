@@ -5,12 +5,12 @@ use super::parts::{
 };
 use crate::{
     fem::{Body, Edge, GAUSS, Subdomain, TriangleParts, add_body_force, add_traction, parabola},
-    mesh::Face,
+    mesh::{CHORDS, Face},
     problem::boundary_conditions::Traction,
     scene::{Expression, Scene, SurfaceLoad},
 };
 use nalgebra::Vector2;
-use std::{collections::BTreeMap, f64::consts::FRAC_PI_6};
+use std::collections::BTreeMap;
 
 /// Allowed errors of resultants relative to ∫|f|: for assembled surface loads …
 const DEVIATION: f64 = 1e-6;
@@ -118,8 +118,8 @@ impl SurfaceForce {
     }
 }
 
-/// The halves of `edges`, each a parabola, of a curve that is smooth where they turn by at most 30°. They may be arcs of a
-/// single edge there, which do not show their shape.
+/// The halves of `edges`, each a parabola, of a curve that is smooth where they turn by at most [`CHORDS`]. They may be
+/// arcs of a single edge there, which do not show their shape.
 ///
 /// The tangents of both edges at a node err in opposite senses, by the length ℓ of a straight edge or the square of the
 /// length of a parabola. Their mean with the weights of the other edge is exact for a circle. At an end of the curve, the
@@ -143,8 +143,7 @@ fn smooth_halves(edges: &[Edge], points: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
         let changes = [0.0, 1.0].map(|s| {
             let (length, own) = end(edge, s);
             let mut others = faces[&edge.ends[s as usize]].iter();
-            let (_, other) =
-                others.find(|(n, face)| *n != number && face.angle(&own) <= FRAC_PI_6)?;
+            let (_, other) = others.find(|(n, face)| *n != number && face.angle(&own) <= CHORDS)?;
             let swapped = [(own, other.length), (*other, own.length)];
             let [own_part, part] = swapped.map(|(face, length)| Face { length, ..face });
             let [nx, ny] = own_part.joined(&part).normal;
