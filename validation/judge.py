@@ -229,7 +229,7 @@ def judge_frames(discrete, frames, output):
 
 def shown(step, frame, scale):
     """The errors of the written gap and pressure. The gap is the smallest g − u·ν of a node's rows. In P1 the pressure is
-    the nodal reaction over the tributary length, at nodes with one row and without prescribed values."""
+    the nodal reaction over the tributary length, at nodes with one row and one material and without prescribed values."""
     rows, (force, length) = step.rows, scale
     slack = np.full(len(frame.gap), np.inf)
     np.minimum.at(slack, rows.node, rows.value - along(rows, frame.u))
@@ -238,6 +238,12 @@ def shown(step, frame, scale):
         return "the gap field is not what the displacement leaves"
     single = np.bincount(rows.node, minlength=len(seen)) == 1
     single[step.prescribed.node] = False
+    elements, stiffness = step.discrete.elements, step.discrete.d
+    kinds = np.unique(stiffness.reshape(len(stiffness), -1), axis=0, return_inverse=True)[1].reshape(-1, 1)
+    least, largest = np.full(len(seen), len(kinds)), np.full(len(seen), -1)
+    np.minimum.at(least, elements, kinds)
+    np.maximum.at(largest, elements, kinds)
+    single &= least == largest
     if not seen[single].all():
         return "the gap field lacks a node of Γ_C"
     reaction = along(rows, step.f - step.k @ frame.u)

@@ -182,7 +182,11 @@ impl Extremes {
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
         /// On six bodies half of it changed nothing; twice of it changed meshes.
         const EDGES: f64 = 3.001;
-        let extremes = self.of_points.iter().zip(self.near(points, EDGES));
+        let pressure = self.of_points.iter().position(|of| of.name == "pressure_max");
+        let presses =
+            |at| pressure.is_some_and(|i| self.fields[i].iter().any(|of| of.1 == at && of.0 > 0.0));
+        let points = points.iter().filter(|of| !of.is_open || !presses(of.at)).cloned();
+        let extremes = self.of_points.iter().zip(self.near(&Vec::from_iter(points), EDGES));
         extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
     }
 

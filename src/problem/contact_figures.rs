@@ -66,7 +66,8 @@ impl DiscreteProblem {
             };
             let edges = around.iter().map(|other| (other.arc_length - row.arc_length).abs());
             let (at, radius) = ([row.x, row.y], edges.fold(0.0, f64::max));
-            Some(Singular { at, radius, name: format!("{reason} of `{}`", row.boundary) })
+            let name = format!("{reason} of `{}`", row.boundary);
+            Some(Singular { at, radius, name, is_open: false })
         };
         let lines = rows.chunk_by(is_next);
         let places = lines.flat_map(|line| (0..line.len()).map(move |i| (line, i)));

@@ -11,6 +11,10 @@
 //! values. The reaction of a vertex with a prescribed displacement is not of contact: the edge is shared in halves.
 //!
 //! Where boundaries meet smoothly at a node, those with the least gap there share its reaction.
+//!
+//! At a vertex between two materials the pressure jumps. Each side then has a station of its own. With the parts λ_a and λ_b of
+//! the length there, the reaction F = (λ_a + λ_b) p becomes the pressures p_a = p − J λ_b/(λ_a + λ_b) and p_b = p_a + J. The
+//! jump J is the difference of the pressures that the next two stations of each side extrapolate.
 
 use super::State;
 use crate::{
@@ -32,6 +36,8 @@ pub struct ContactLine {
     places: BTreeMap<usize, Vec<(Face, Vec<Place>)>>,
     /// The stations at which closed parts begin and end in a vertex without a corner.
     seams: Vec<[usize; 2]>,
+    /// The two stations of each vertex between materials: the end of an edge, and the start of the next one.
+    joints: Vec<[usize; 2]>,
     /// Per number of a boundary: its gap g(x, y, t), m.
     gaps: BTreeMap<usize, Expression>,
 }
@@ -94,21 +100,32 @@ pub struct ContactRow {
 type Reaction = [f64; 7];
 
 impl ContactLine {
-    /// The parts of these boundaries (number, name, gap, edges) of a body, whose nodes are `points`.
+    /// The parts of these boundaries (number, name, gap, edges) of a body, whose nodes are `points`. Materials meet at the
+    /// nodes `between` them.
     pub(super) fn new<'a>(
         boundaries: impl IntoIterator<Item = (usize, &'a str, &'a Gap, Vec<Edge>)>,
         points: &[[f64; 2]],
         lines: &Lines,
+        between: &BTreeSet<usize>,
     ) -> Self {
         let (mut line, mut places) = (Self::default(), Vec::new());
         for (boundary, name, gap, edges) in boundaries {
             line.gaps.insert(boundary, gap.distance.clone());
             for (part, edges) in connected(&edges).iter().enumerate() {
                 let row = ContactRow { boundary: name.to_owned(), part, ..ContactRow::default() };
-                line.add((boundary, row), gap.normal, (points, lines), edges, &mut places);
+                let lines = (points, lines, between);
+                line.add((boundary, row), gap.normal, lines, edges, &mut places);
             }
         }
-        Self { places: joined_faces(places), ..line }
+        line.places = joined_faces(places);
+        let joints = between.iter().flat_map(|node| line.places.get(node)).flatten();
+        let pair = |(_, places): &(Face, Vec<Place>)| match places[..] {
+            [(a, _), (b, _)] if line.beside(a, -1, 1).is_some() => Some([a, b]),
+            [(a, _), (b, _)] => Some([b, a]),
+            _ => None,
+        };
+        line.joints = joints.filter_map(pair).collect();
+        line
     }
 
     /// Adds the `edges` of a connected part, whose rows are like `row`, and the `places` of its nodes.
@@ -116,7 +133,7 @@ impl ContactLine {
         &mut self,
         (boundary, row): (usize, ContactRow),
         normal: Option<[f64; 2]>,
-        (points, lines): (&[[f64; 2]], &Lines),
+        (points, lines, between): (&[[f64; 2]], &Lines, &BTreeSet<usize>),
         edges: &[Edge],
         places: &mut Vec<(usize, Face, Place)>,
     ) {
@@ -135,8 +152,9 @@ impl ContactLine {
             let middle = edge.middle.unwrap_or(b);
             let half = distance(a, middle);
             let length = half + distance(middle, b);
+            let goes_on = !between.contains(&a);
             match self.stations.last_mut() {
-                Some(before) if last.is_some_and(|last| last.continues(&faces[0].1)) => {
+                Some(before) if goes_on && last.is_some_and(|l| l.continues(&faces[0].1)) => {
                     before.length += 0.5 * length;
                 }
                 _ => self.stations.push(station(a, start, 0.5 * length)),
@@ -149,9 +167,11 @@ impl ContactLine {
             places.extend(of_edge.map(|(&(node, face), n)| (node, face, (n, face.length))));
             (start, first, last) = (start + length, first.or(Some(faces[0].1)), Some(faces[1].1));
         }
-        let is_closed =
-            edges.first().map(|edge| edge.ends[0]) == edges.last().map(|edge| edge.ends[1]);
-        if is_closed && first.zip(last).is_some_and(|(first, last)| last.continues(&first)) {
+        let [from, to] = [edges[0].ends[0], edges[edges.len() - 1].ends[1]];
+        if from == to
+            && !between.contains(&from)
+            && first.zip(last).is_some_and(|(first, last)| last.continues(&first))
+        {
             self.seams.push([begin, self.stations.len() - 1]);
         }
     }
@@ -190,9 +210,17 @@ impl ContactLine {
         lengths.iter().map(share).collect()
     }
 
-    /// The rows in a state, boundary by boundary and along each, on every rank; and the pressures at this rank's nodes of
-    /// Γ_C, Pa. Collective.
-    pub fn rows(&self, body: &Body, state: &State) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
+    /// The arc length between a station and the one that follows `steps` later or earlier on its part, m, and its number.
+    fn beside(&self, station: usize, direction: isize, steps: isize) -> Option<(f64, usize)> {
+        let number = station.checked_add_signed(direction * steps)?;
+        let [own, other] = [&self.stations[station].row, &self.stations.get(number)?.row];
+        let length = direction as f64 * (other.arc_length - own.arc_length);
+        let is_beside = (&own.boundary, own.part) == (&other.boundary, other.part) && length > 0.0;
+        is_beside.then_some((length, number))
+    }
+
+    /// The reactions at all stations in order, on every rank, with those of joints in proportion to lengths. Collective.
+    fn reactions(&self, body: &Body, contact: &[ContactPoint], t: f64) -> Vec<Reaction> {
         let reactions = |point: &ContactPoint| {
             let ContactPoint { normal, force, pressure, gap, active, .. } = *point;
             // No -0.
@@ -203,12 +231,71 @@ impl ContactLine {
                 let active = f64::from(u8::from(active && share.force > 0.0));
                 [station, nx, ny, gap, share.force * force, share.pressure * pressure, active]
             };
-            self.shares(point, state.time).into_iter().map(of)
+            self.shares(point, t).into_iter().map(of)
         };
-        let own: Vec<Reaction> = state.contact.iter().flat_map(reactions).collect();
+        let own: Vec<Reaction> = contact.iter().flat_map(reactions).collect();
         let all = body.nodes.partition.comm().gather(own.as_flattened());
         let mut all: Vec<Reaction> = all.as_chunks().0.to_vec();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        all
+    }
+
+    /// The force to move from the first to the second station of each joint, N per metre of thickness, and the places of both
+    /// in `all` reactions.
+    fn moved<'a>(&'a self, all: &'a [Reaction]) -> impl Iterator<Item = ([usize; 2], f64)> + 'a {
+        let place = |k: usize| all.binary_search_by(|of| of[0].total_cmp(&(k as f64))).ok();
+        // Another joint does not know its pressures yet.
+        let is_joint = |station: &usize| self.joints.as_flattened().contains(station);
+        let extrapolated = move |station: usize, direction: isize| {
+            let beside = |steps: isize| {
+                let (length, number) = self.beside(station, direction, steps)?;
+                Some((length, all[place(number)?][5])).filter(|_| !is_joint(&number))
+            };
+            let (length, p) = beside(1)?;
+            let slope = beside(2).map(|(farther, q)| (p - q) / (farther - length));
+            Some(p + slope.unwrap_or(0.0) * length)
+        };
+        self.joints.iter().filter_map(move |&[a, b]| {
+            let jump = extrapolated(b, 1)? - extrapolated(a, -1)?;
+            let places = [place(a)?, place(b)?];
+            let [(f, p), (g, _)] = places.map(|i| (all[i][4], all[i][5]));
+            let force = f * g / (f + g) * jump / p;
+            force.is_finite().then(|| (places, force.clamp(-g, f)))
+        })
+    }
+
+    /// The forces to move between boundaries at joints, on the first rank alone: the numbers of both boundaries, the place, m,
+    /// and the force on the body, N per metre of thickness. Collective.
+    pub(super) fn moved_forces(
+        &self,
+        body: &Body,
+        (contact, t): (&[ContactPoint], f64),
+    ) -> Vec<([usize; 2], [f64; 2], [f64; 2])> {
+        let boundaries = |of: &[usize; 2]| of.map(|station| self.stations[station].boundary);
+        if !self.joints.iter().map(boundaries).any(|[a, b]| a != b) {
+            return Vec::new();
+        }
+        let all = self.reactions(body, contact, t);
+        let of = |(places, force): ([usize; 2], f64)| {
+            let [nx, ny] = [1, 2].map(|k| -force * all[places[0]][k]);
+            let stations = places.map(|i| &self.stations[all[i][0] as usize]);
+            let ContactRow { x, y, .. } = stations[0].row;
+            (stations.map(|of| of.boundary), [x, y], [nx, ny])
+        };
+        let is_first = body.nodes.partition.comm().rank() == 0;
+        self.moved(&all).map(of).filter(|_| is_first).collect()
+    }
+
+    /// The rows in a state, boundary by boundary and along each, on every rank; and the pressures at this rank's nodes of
+    /// Γ_C, Pa. Collective.
+    pub fn rows(&self, body: &Body, state: &State) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
+        let mut all = self.reactions(body, &state.contact, state.time);
+        for (places, force) in Vec::from_iter(self.moved(&all)) {
+            for (i, change) in places.into_iter().zip([-force, force]) {
+                all[i][5] *= 1.0 + change / all[i][4];
+                all[i][4] += change;
+            }
+        }
         let pressures = self.pressures(&all);
         let row = |&[number, normal_x, normal_y, gap, force, _, active]: &Reaction| {
             let (station, time) = (number as usize, state.time);

@@ -27,6 +27,8 @@ pub struct Singular {
     pub radius: f64,
     /// What it is, as in "the end of `clamp`".
     pub name: String,
+    /// Is it singular only while contact is open there?
+    pub is_open: bool,
 }
 
 /// A condition on an edge, and its boundary.
@@ -84,7 +86,7 @@ fn conditions(support: Option<&Support>, angle: f64) -> (u8, Vec<Matrix2x4<f64>>
     let free = Matrix2x4::new(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     match support.map(|(condition, _)| condition) {
         None | Some(Condition::Load(_)) => (0, vec![free]),
-        Some(Condition::Gap(gap)) => (1, vec![free, sliding(gap.normal)]),
+        Some(Condition::Gap(gap)) => (1, vec![sliding(gap.normal), free]),
         Some(Condition::Symmetry) => (2, vec![sliding(None)]),
         Some(Condition::Displacement([Some(_), None])) => (2, vec![sliding(Some([1.0, 0.0]))]),
         Some(Condition::Displacement([None, _])) => (2, vec![sliding(Some([0.0, 1.0]))]),
@@ -170,15 +172,24 @@ impl DiscreteProblem {
         let [(a, of_a), (b, of_b)] = [(sides[0], first), (sides[1], last)]
             .map(|(side, end)| conditions(side, wedges.tangent(node, end)));
         let (is_inside, slides) = (first == last, a.min(b) > 0 && a.max(b) < 3);
-        let [p, q] = [&of_a, &of_b].map(|of| of[of.len() - 1]);
+        let [p, q] = [of_a[0], of_b[0]];
         let is_same = a == b && (p - q).norm().min((p + q).norm()) < 0.1;
         let ends = &wedges.lines.ends[&node];
-        let is_smooth = matches!(ends[..], [p, q] if wedges.lines.is_smooth(node, [p, q]));
+        let is_smooth = match ends[..] {
+            [p, q] => wedges.lines.is_smooth(node, [p, q]),
+            _ => !is_inside && wedges.lines.is_smooth(node, [last, first]),
+        };
         let jumps = is_smooth && a == 1 && b == 1 && self.gap_jumps([last, node, first], sides);
-        if is_smooth && is_same && !jumps {
+        let is_same = is_smooth && is_same && !jumps;
+        if is_same && ends.len() == 2 {
             return None;
         }
-        let mut cases = of_a.iter().flat_map(|a| of_b.iter().map(|b| [*a, *b]));
+        // Contact on both sides of the end of an interface is closed on both, or open.
+        let cases = (0..of_a.len()).flat_map(|i| (0..of_b.len()).map(move |k| [i, k]));
+        let mut cases = cases.filter(|[i, k]| !is_same || i == k);
+        let case = cases
+            .find(|&[i, k]| is_singular(&sectors, (!is_inside).then_some([of_a[i], of_b[k]])))?;
+        let is_open = case == [of_a.len() - 1, of_b.len() - 1] && case != [0, 0];
         let of = sides[usize::from(b > a)].map_or("", |(_, boundary)| &*boundary.name);
         let lengths = ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1);
         let name = match sectors.len() {
@@ -189,9 +200,8 @@ impl DiscreteProblem {
             _ if a != b => format!("the end of `{of}`"),
             _ => "a re-entrant corner".to_owned(),
         };
-        let is_singular = cases.any(|sides| is_singular(&sectors, (!is_inside).then_some(sides)));
         let (at, radius) = (self.mesh().nodes[node], lengths.fold(0.0, f64::max));
-        is_singular.then_some(Singular { at, radius, name })
+        Some(Singular { at, radius, name, is_open })
     }
 
     /// Does the gap jump between the middles of the edges pq and qr of Γ_C, at the start or the end of the run? Bisection

@@ -52,7 +52,15 @@ impl Supports {
             let edges = body.edges(&body.mesh.curves.get(name)?.edges);
             Some((number, &**name, boundary.gap()?, edges))
         });
-        supports.contact = ContactLine::new(contact, &body.nodes.points, lines);
+        // There an interface ends at the boundary.
+        let is_between = |(node, ends): (usize, Vec<usize>)| {
+            let of_boundary = lines.ends.get(&node).map_or(0, Vec::len);
+            (of_boundary > 0 && ends.len() > of_boundary).then_some(node)
+        };
+        let zones =
+            (!body.materials.is_empty()).then(|| Lines::new(&body.mesh, |t| body.material(t)));
+        let between = zones.into_iter().flat_map(|of| of.ends).filter_map(is_between).collect();
+        supports.contact = ContactLine::new(contact, &body.nodes.points, lines, &between);
         let several = |of: &[(usize, [f64; 2])]| of.iter().any(|(number, _)| *number != of[0].0);
         let shared = supports.prescribed.iter().filter(|(_, of)| several(of));
         let shared: BTreeSet<usize> = shared.map(|(node, _)| *node).collect();
@@ -104,8 +112,8 @@ impl Supports {
         stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
     ) -> Vec<f64> {
         let mut sums = vec![0.0; 3 * self.names.len()];
-        let mut add = |boundary: usize, node: usize, [fx, fy]: [f64; 2]| {
-            let [x, y] = body.nodes.points[node];
+        let points = &body.nodes.points;
+        let mut add = |boundary: usize, [x, y]: [f64; 2], [fx, fy]: [f64; 2]| {
             for (sum, part) in sums[3 * boundary..].iter_mut().zip([fx, fy, x * fy - y * fx]) {
                 *sum += part;
             }
@@ -117,15 +125,21 @@ impl Supports {
             let force = point.normal.map(|n| -point.force * n);
             for share in self.contact.shares(point, t) {
                 let boundary = self.contact.stations[share.station].boundary;
-                add(boundary, point.node, force.map(|f| share.force * f));
+                add(boundary, points[point.node], force.map(|f| share.force * f));
             }
             if let Some([x, y]) = rest.get_mut(&point.node) {
                 (*x, *y) = (*x - force[0], *y - force[1]);
             }
         }
+        for ([from, to], at, force) in self.contact.moved_forces(body, (contact, t)) {
+            add(from, at, force.map(|f| -f));
+            add(to, at, force);
+        }
         for (node, force) in rest {
             let exerted = self.divided(node, force.into(), &stress);
-            exerted.into_iter().for_each(|(boundary, force)| add(boundary, node, force.into()));
+            exerted
+                .into_iter()
+                .for_each(|(boundary, force)| add(boundary, points[node], force.into()));
         }
         sums
     }

@@ -244,3 +244,65 @@ fn contact_around_a_corner_of_a_closed_foundation_has_the_same_figures_wherever_
         assert!(apart.fold(0.0, f64::max) < 1e-7, "edge {first}: {found:?}, {expected:?}");
     }
 }
+
+/// Stripes with E = 100, 200, … side by side, from 0 to `at[0]`, to `at[1]`, … on the unit square.
+fn striped(mut mesh: Mesh, at: &[f64]) -> Mesh {
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let centre = triangle.iter().map(|&node| mesh.nodes[node][0]).sum::<f64>() / 3.0;
+        let stripe = at.iter().filter(|x| **x < centre).count();
+        mesh.surfaces.entry(format!("s{stripe}")).or_default().push(t);
+    }
+    mesh
+}
+
+#[test]
+fn materials_side_by_side_press_with_a_pressure_each_up_to_their_interface() {
+    // ν is the same on all sides, so that σ_yy = E ε_yy is uniform in each stripe.
+    for (degree, angle, poisson) in [(1, 0.0, 0.0), (2, 0.4, 0.0), (1, 2.0, 0.3), (2, 0.0, 0.3)] {
+        for at in [&[0.5][..], &[1.0 / 3.0, 2.0 / 3.0]] {
+            for several in [false, true] {
+                let wide = |x: f64| 0.01 * poisson * x;
+                let [down, right] = [turn(angle, [0.0, -0.01]), turn(angle, [wide(1.0), 0.0])];
+                let [c, s] = turn(angle, [1.0, 0.0]);
+                let along = |k: usize| format!("{} + ({})*({c}*x + {s}*y)", down[k], right[k]);
+                let foundations = match several {
+                    false => "{ name = 'bottom', gap = 0 }",
+                    true => "{ name = 'near', gap = 0 }, { name = 'far', gap = 0 }",
+                };
+                let third = if at.len() > 1 { ", s2 = { young = 300 }" } else { "" };
+                let text = format!(
+                    "contact.tolerance = 1e-12
+                     discretisation.displacement = {degree}
+                     material = {{ young = 100, poisson = {poisson}, plane = 'stress',
+                                   s1 = {{ young = 200 }}{third} }}
+                     boundary = [{foundations}, {{ name = 'top', displacement = ['{}', '{}'] }}]",
+                    along(0),
+                    along(1)
+                );
+                let mesh = moved(striped(divided(square(6), at[0]), at), |x| turn(angle, x));
+                let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+                let last = run(&problem, SOLVERS[0]).last;
+                let parts = parts(&problem, &last.state);
+                let count = if several { 2 } else { 1 };
+                assert_eq!(parts.concat().len(), 6 * degree + 1 + at.len(), "{at:?}, {several}");
+                assert_eq!(parts.len(), count);
+                let mut before = 0;
+                for (i, row) in parts.concat().iter().enumerate() {
+                    // At an interface the first row is that of the stripe on its left.
+                    let [x, _] = turn(-angle, [row.x, row.y]);
+                    let stripe = at.iter().filter(|at| x > **at - 1e-9).count();
+                    let is_joint = at.iter().any(|at| (x - at).abs() < 1e-9) && before < stripe;
+                    before = stripe;
+                    let expected = (1 + stripe - usize::from(is_joint)) as f64;
+                    assert!((row.pressure - expected).abs() < 1e-8, "row {i} at {x}: {row:?}");
+                }
+                let names = problem.quantities();
+                for part in &parts {
+                    let name = format!("{}.force_y", part[0].boundary);
+                    let force = last.quantities[names.iter().position(|of| *of == name).unwrap()];
+                    close_to(area(part) * angle.cos(), force, 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -2,7 +2,10 @@
 //! roots of determinants of Williams's functions (J. Appl. Mech. 19, 1952), computed with 30 digits by a program of its own.
 
 use crate::support::{moved, problem, square, unstructured};
-use signorini::mesh::{Curve, Mesh};
+use signorini::{
+    mesh::{Curve, Mesh},
+    problem::Singular,
+};
 use std::f64::consts::FRAC_PI_2;
 
 /// Sectors around the origin: an angle in degrees and Young's modulus for each, on curves `first` and `last` or, in a full
@@ -67,7 +70,8 @@ fn label(sectors: &[(f64, f64)], plane: &str, poisson: f64, sides: Option<[&str;
     );
     let problem = problem(fan(sectors, sides.is_none()), &text).unwrap_or_else(|e| panic!("{e}"));
     let mut points = problem.singular_points().into_iter();
-    points.find(|point| point.at == [0.0, 0.0]).map_or_else(String::new, |point| point.name)
+    let name = |of: Singular| if of.is_open { format!("{}, open", of.name) } else { of.name };
+    points.find(|point| point.at == [0.0, 0.0]).map_or_else(String::new, name)
 }
 
 const FREE: &str = "";
@@ -80,6 +84,8 @@ const ACROSS: &str = "displacement = [0, 'free']";
 const REENTRANT: &str = "a re-entrant corner";
 const FIRST: &str = "the end of `first`";
 const JOINT: &str = "the end of an interface of two materials";
+const FIRST_OPEN: &str = "the end of `first`, open";
+const OPEN: &str = "the end of an interface of two materials, open";
 const INCLUSION: &str = "a corner of an inclusion";
 const REGULAR: &str = "";
 
@@ -130,7 +136,7 @@ const CORNERS: &[Corner] = &[
     (&[(90.0, 1.0)], "stress", 0.3, Some([CONTACT, FREE]), 1.0, REGULAR),
     (&[(180.0, 1.0)], "stress", 0.3, Some([CONTACT, FREE]), 0.5, FIRST),
     (&[(180.0, 1.0)], "stress", 0.3, Some([CONTACT, CONTACT]), 1.0, REGULAR),
-    (&[(90.0, 1.0)], "stress", 0.3, Some([CLAMPED, CONTACT]), 0.758349, FIRST),
+    (&[(90.0, 1.0)], "stress", 0.3, Some([CLAMPED, CONTACT]), 0.758349, FIRST_OPEN),
     // Two materials.
     (&[(90.0, 1.0), (90.0, 2.0)], "stress", 0.3, Some([FREE, FREE]), 0.973254, JOINT),
     (&[(90.0, 1.0), (90.0, 10.0)], "stress", 0.3, Some([FREE, FREE]), 0.840813, JOINT),
@@ -140,6 +146,12 @@ const CORNERS: &[Corner] = &[
     (&[(90.0, 1.0), (90.0, 10.0)], "stress", 0.3, Some([CLAMPED, CLAMPED]), 0.796198, JOINT),
     (&[(180.0, 1.0), (180.0, 10.0)], "stress", 0.3, Some([FREE, FREE]), 0.5, JOINT),
     (&[(90.0, 1.0), (90.0, 1.0)], "stress", 0.3, Some([FREE, FREE]), 1.0, REGULAR),
+    // Contact is open or closed on both sides: without ν both are regular; with it only the closed one is.
+    (&[(90.0, 1.0), (90.0, 2.0)], "stress", 0.0, Some([CONTACT, CONTACT]), 1.0, REGULAR),
+    (&[(90.0, 1.0), (90.0, 1000.0)], "stress", 0.0, Some([CONTACT, CONTACT]), 1.0, REGULAR),
+    (&[(90.0, 1.0), (90.0, 10.0)], "stress", 0.3, Some([CONTACT, CONTACT]), 0.840813, OPEN),
+    (&[(45.0, 10.0), (135.0, 1.0)], "stress", 0.3, Some([SLIDING, SLIDING]), 0.786447, JOINT),
+    (&[(45.0, 10.0), (135.0, 1.0)], "stress", 0.3, Some([CONTACT, CONTACT]), 0.786447, JOINT),
     // Inside the body.
     (&[(90.0, 1000.0), (270.0, 1.0)], "stress", 0.3, None, 0.607006, INCLUSION),
     (&[(90.0, 0.001), (270.0, 1.0)], "stress", 0.3, None, 0.545883, INCLUSION),
