@@ -1,7 +1,7 @@
 //! The figures that a run prints, and their error bars.
 
-use super::DiscreteProblem;
-use crate::scene::{Expression, Stepping};
+use super::{DiscreteProblem, notes::TIMES};
+use crate::scene::Stepping;
 use serde::{Deserialize, Serialize};
 use std::iter;
 
@@ -21,9 +21,6 @@ const MIN_SCALE: f64 = 1e-3;
 /// small about any point near the line of its force. The scale of a stress is at least this fraction of the mean stress
 /// of the body, about √(E ‖u‖²/|Ω|): a stress at a free corner is zero.
 const MIN_PART: f64 = 0.1;
-/// The relative error of the integral of a body force that varies in space. Both meshes of a measurement may
-/// have the same error, which the measurement then misses.
-const BODY_FORCE: f64 = 1e-4;
 /// The error of uniform time steps over its estimate.
 const UNIFORM: f64 = 2.5;
 /// A damage below this is negligible.
@@ -201,7 +198,8 @@ impl DiscreteProblem {
         self.figures().iter().zip(values).map(size).collect()
     }
 
-    /// Adds to the error bars the solver's tolerance and the errors of body-force integrals and time steps.
+    /// Adds to the error bars the solver's tolerance and the errors of the loads' integrals, which all meshes
+    /// of a measurement may have, and of the time steps.
     ///
     /// The steps change ζ by at most `most` at a node and by `mean` on average, and so u by `displacement`
     /// (relative, energy norm): u depends on the past only through ζ. The error of uniform steps is multiplied:
@@ -210,11 +208,18 @@ impl DiscreteProblem {
         let grid = self.scene().time.map(|grid| grid.stepping);
         let uniform = matches!(grid, Some(Stepping::Uniform { .. }));
         let [most, mean, displacement] = of_steps.map(|e| if uniform { UNIFORM * e } else { e });
-        let varies = self.scene().body_force.iter().any(Expression::depends_on_space);
-        let forces = if varies { BODY_FORCE } else { 0.0 };
+        let [force, of_loads] =
+            self.loads.integral_errors(&self.body, &self.scene().sample_times(TIMES));
+        let lever =
+            self.body.radius_of_gyration() + self.body.centroid[0].hypot(self.body.centroid[1]);
         for bar in bars {
-            let of_zeta = bar.dimension == Dimension::Damage;
-            bar.bar += (self.tolerance + if of_zeta { 0.0 } else { forces }) * bar.scale;
+            bar.bar += self.tolerance * bar.scale;
+            bar.bar += match bar.dimension {
+                Dimension::Damage => 0.0,
+                Dimension::Force => force.max(of_loads * bar.scale),
+                Dimension::Moment => (lever * force).max(of_loads * bar.scale),
+                _ => of_loads * bar.scale,
+            };
             bar.bar += match bar.dimension {
                 Dimension::Damage if bar.name == "zeta_mean" => mean,
                 Dimension::Damage => most,

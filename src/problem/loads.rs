@@ -73,7 +73,7 @@ impl Loads {
         let body = self.body_force.iter();
         let body = body.map(|force| ("the body force", "triangles", force.missed));
         let surface = self.surface_forces.iter().map(|force| {
-            let missed = times.iter().map(|&t| force.missed(t)).fold(0.0, f64::max);
+            let missed = times.iter().map(|&t| force.resolved(t).missed).fold(0.0, f64::max);
             ("a traction or pressure", "edges", missed)
         });
         let note = |(name, elements, missed): (&str, &str, f64)| {
@@ -110,8 +110,22 @@ impl Loads {
     pub(super) fn resultant_error(&self, body: &Body, t: f64) -> ([f64; 3], f64) {
         let errors = self.surface_forces.iter().map(|f| f.resultant_error(body.centroid, t));
         let sum = errors.fold([0.0; 3], |sum, error| [0, 1, 2].map(|k| sum[k] + error[k]));
-        let missed = self.surface_forces.iter().map(|force| force.missed(t));
+        let missed = self.surface_forces.iter().map(|force| force.resolved(t).missed);
         (sum, missed.chain(self.body_force.iter().map(|force| force.missed)).fold(0.0, f64::max))
+    }
+
+    /// The estimated errors of the integrals of all loads at some times: the largest one, N per metre of thickness, and
+    /// relative to the largest Σ|f|. Collective.
+    pub(super) fn integral_errors(&self, body: &Body, times: &[f64]) -> [f64; 2] {
+        let partition = &body.nodes.partition;
+        let [mut error, mut size] = [0.0_f64; 2];
+        for &t in times {
+            let surface = self.surface_forces.iter().map(|force| force.resolved(t).error);
+            error = error.max(surface.chain(self.body_force.iter().map(|of| of.error)).sum());
+            let own = self.at(body, t).into_iter().take(2 * partition.owned());
+            size = size.max(partition.comm().total(own.map(f64::abs).sum()));
+        }
+        [error, if error > 0.0 { error / size } else { 0.0 }]
     }
 
     /// The values of all rows at time t, m: prescribed displacements u·d, and gaps.

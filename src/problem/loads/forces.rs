@@ -66,15 +66,15 @@ impl SurfaceForce {
         edge_parts(&self.lines, self.force.expressions(), t, deviation)
     }
 
-    /// The fraction of ∫|f_N| that may be missed at time t.
-    pub(super) fn missed(&self, t: f64) -> f64 {
-        self.parts(t, DEVIATION).missed
+    /// The parts of its edges for the nodal loads at time t.
+    pub(super) fn resolved(&self, t: f64) -> Parts<EdgePart> {
+        self.parts(t, DEVIATION)
     }
 
     /// Adds the nodal loads at time t.
     pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
-        let parts = self.parts(t, DEVIATION).parts;
-        let parts = parts.into_iter().filter_map(|(edge, part)| Some((self.edges[edge]?, part)));
+        let parts = self.resolved(t).parts.into_iter();
+        let parts = parts.filter_map(|(edge, part)| Some((self.edges[edge]?, part)));
         add_traction(&body.nodes.points, parts, |x, normal| self.force.at(x, normal, t), load);
     }
 
@@ -178,8 +178,9 @@ pub(super) struct BodyForce {
     parts_of_triangles: TriangleParts,
     /// The sample points, m, each with the area that it represents, m², and the density there.
     samples: Vec<([f64; 2], [f64; 2])>,
-    /// The fraction of ∫|f_B| that may be missed.
+    /// The fraction of ∫|f_B| that may be missed, and the error of ∫f_B, N per metre of thickness.
     pub(super) missed: f64,
+    pub(super) error: f64,
 }
 
 impl BodyForce {
@@ -195,11 +196,11 @@ impl BodyForce {
         let (times, more) = if in_time { (&times[..], MORE[0]) } else { (&times[..1], MORE[1]) };
         let in_space = force.iter().any(Expression::depends_on_space);
         let triangles = triangle_points(body);
-        let Parts { parts, missed } = match in_space {
+        let Parts { parts, missed, error } = match in_space {
             true => triangle_parts(&triangles, (&force, 0.0), times, more),
             false => {
                 let parts = (0..triangles.len()).map(|triangle| (triangle, WHOLE)).collect();
-                Parts { parts, missed: 0.0 }
+                Parts { parts, missed: 0.0, error: 0.0 }
             }
         };
         let (whole, parts): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| part.1 == WHOLE);
@@ -211,7 +212,7 @@ impl BodyForce {
         let samples = [whole, parts];
         let samples = samples.iter().flat_map(|parts| self::samples(&triangles, parts, density));
         let samples = samples.collect();
-        Some(Self { force, gravity, densities, parts_of_triangles, samples, missed })
+        Some(Self { force, gravity, densities, parts_of_triangles, samples, missed, error })
     }
 
     pub(super) fn expressions(&self) -> impl Iterator<Item = &Expression> {
