@@ -7,7 +7,7 @@ use signorini::{
     interrupt::Signal,
     mesh::{Mesh, Order},
     petsc::Session,
-    problem::{Bar, Dimension},
+    problem::{Bar, Dimension, locks},
     scene::{Scene, Stepping},
 };
 
@@ -46,8 +46,8 @@ pub(super) fn adapt(
     Ok(Some(adapted))
 }
 
-/// Measures the errors from the mesh, in runs with few steps or with the error `of_steps` of ζ. If such a run fails, one of
-/// the `notes` reports it. Collective.
+/// Measures the errors from the mesh, in runs with few steps or with the error `of_steps` of ζ. If such a run fails, or a finer
+/// mesh would not show the error, one of the `notes` reports it. Collective.
 pub(super) fn measure_errors(
     session: &Session,
     scene: &Scene,
@@ -56,6 +56,13 @@ pub(super) fn measure_errors(
     of_steps: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Measured, Failure> {
+    // A mesh that was adapted is so fine that it does not lock.
+    if of_steps.is_none() && locks(scene).is_some() {
+        notes.push(
+            "no error bars: a finer mesh does not show that linear triangles lock".to_owned(),
+        );
+        return Ok(Measured::default());
+    }
     match estimate::measured_errors(session, scene, mesh, solver, of_steps) {
         Ok(measured) => Ok(measured),
         // The scene fits this mesh, perhaps not the finer one.

@@ -216,6 +216,7 @@ impl DiscreteProblem {
             bar.bar += self.tolerance * bar.scale;
             bar.bar += match bar.dimension {
                 Dimension::Damage => 0.0,
+                Dimension::Force if bar.name == "contact_force" && !self.has_contact() => 0.0,
                 Dimension::Force => force.max(of_loads * bar.scale),
                 Dimension::Moment => (lever * force).max(of_loads * bar.scale),
                 _ => of_loads * bar.scale,

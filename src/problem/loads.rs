@@ -2,9 +2,11 @@
 
 mod curve;
 mod forces;
+mod jumps;
 mod parts;
 
 pub(crate) use curve::LoadCurve;
+pub(super) use jumps::{jump, load_jumps};
 pub(super) use parts::{centroid, edge_parts, triangle_parts, triangle_point};
 
 use super::{

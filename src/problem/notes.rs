@@ -4,7 +4,7 @@ use super::{DiscreteProblem, LoadCurve, unresolved};
 use crate::{
     mesh::{Order, extent},
     model::Plane,
-    scene::{Boundary, Gap},
+    scene::{Boundary, Gap, Scene},
 };
 use std::iter::once;
 
@@ -22,13 +22,18 @@ pub(super) const TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
 
+/// The largest ν of a scene, if linear triangles lock: the change to a finer mesh is then far smaller than the error.
+pub fn locks(scene: &Scene) -> Option<f64> {
+    let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
+    let may_lock = scene.order == Order::Linear && scene.material.plane == Plane::Strain;
+    (may_lock && poisson > LOCKING).then_some(poisson)
+}
+
 impl DiscreteProblem {
     /// Notes for the user before any solve: input that was changed, unconstrained rigid motions, and functions,
     /// materials or triangles that make the discretisation poor. Collective.
     pub fn notes(&self) -> Vec<String> {
         let (scene, linear) = (self.scene(), self.scene().order == Order::Linear);
-        let poisson = scene.materials().map(|material| material.poisson).fold(-1.0, f64::max);
-        let locks = linear && scene.material.plane == Plane::Strain && poisson > LOCKING;
         let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
         let mut notes = self.mesh().notes.clone();
         notes.extend(scene.time.and_then(|grid| grid.note()));
@@ -57,7 +62,7 @@ impl DiscreteProblem {
             (scene.damage.is_some() && scene.time.is_none()).then(|| {
                 "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
             }),
-            locks.then(|| {
+            locks(scene).map(|poisson| {
                 format!(
                     "linear triangles lock in plane strain with ν = {poisson} > {LOCKING}: displacements \
                      may be far too small; set discretisation.displacement = 2"

@@ -8,7 +8,10 @@
 //! z is continuous at interfaces. Sectors with the angles α₁, α₂, … transfer it by T = … exp(α₂A₂) exp(α₁A₁). The sides
 //! have conditions B z = 0 and C z = 0, so that det(B; CT) = 0. Inside the body z returns to itself: det(T − I) = 0.
 
-use super::DiscreteProblem;
+use super::{
+    DiscreteProblem,
+    loads::{jump, load_jumps},
+};
 use crate::{
     mesh::Lines,
     scene::{Boundary, Condition},
@@ -142,7 +145,28 @@ impl DiscreteProblem {
             let first = ends.iter().copied().filter(is_first);
             first.chain(is_inside.then_some(ends[0])).map(move |first| [node, first])
         });
-        first.filter_map(|edge| self.singular(&wedges, &supports, edge)).collect()
+        let corners = first.filter_map(|edge| self.singular(&wedges, &supports, edge));
+        corners.chain(self.shear_jumps(&wedges.lines)).collect()
+    }
+
+    /// The jumps of a shear load τ on smooth boundaries: nearby σ_tt grows like (2τ/π) ln r along the tangent t. A jump of the
+    /// normal load leaves stresses bounded.
+    fn shear_jumps(&self, lines: &Lines) -> Vec<Singular> {
+        let singular = |(node, [x, y, pressure]): (usize, [f64; 3])| {
+            let ends = &lines.ends[&node];
+            let [tx, ty] = lines.tangent(node, ends[0]);
+            let shear = (x * tx + y * ty).abs() / tx.hypot(ty);
+            let radius =
+                ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max);
+            let (at, name) = (self.mesh().nodes[node], "a jump of a shear load".to_owned());
+            (shear > SEEN * x.hypot(y).hypot(pressure)).then_some(Singular {
+                at,
+                radius,
+                name,
+                is_open: false,
+            })
+        };
+        load_jumps(self.scene(), self.mesh(), lines).into_iter().filter_map(singular).collect()
     }
 
     /// The lines of the mesh with its wedges.
@@ -204,22 +228,15 @@ impl DiscreteProblem {
         Some(Singular { at, radius, name, is_open })
     }
 
-    /// Does the gap jump between the middles of the edges pq and qr of Γ_C, at the start or the end of the run? Bisection
-    /// follows the larger change of the gap. A jump does not vanish.
+    /// Does the gap jump between the middles of the edges pq and qr of Γ_C, at the start or the end of the run?
     fn gap_jumps(&self, nodes: [usize; 3], [after, before]: [Option<&Support>; 2]) -> bool {
-        let [p, q, r] = nodes.map(|node| self.mesh().nodes[node]);
-        let gap = |s: f64, t: f64| {
-            let (end, side) = if s < 0.0 { (p, before) } else { (r, after) };
-            let [x, y] = [0, 1].map(|i| q[i] + 0.5 * s.abs() * (end[i] - q[i]));
-            side.and_then(|side| side.1.gap()).map_or(0.0, |gap| gap.distance.eval(x, y, t))
-        };
+        let points @ [p, _, r] = nodes.map(|node| self.mesh().nodes[node]);
         self.scene().sample_times(1).into_iter().any(|t| {
-            let change = |[a, b]: [f64; 2]| (gap(a, t) - gap(b, t)).abs();
-            let part = (0..50).fold([-1.0, 1.0], |[low, high], _| {
-                let halves = [[low, 0.5 * (low + high)], [0.5 * (low + high), high]];
-                halves[usize::from(change(halves[1]) > change(halves[0]))]
-            });
-            change(part) > 1e-9 * (p[0] - r[0]).hypot(p[1] - r[1])
+            let gap = |side: usize, [x, y]: [f64; 2]| {
+                let gap = [before, after][side].and_then(|side| side.1.gap());
+                [gap.map_or(0.0, |gap| gap.distance.eval(x, y, t))]
+            };
+            jump(points, gap)[0].abs() > 1e-9 * (p[0] - r[0]).hypot(p[1] - r[1])
         })
     }
 

@@ -162,3 +162,29 @@ fn a_pressure_that_is_not_resolved_has_no_bar() {
         }
     }
 }
+
+#[test]
+fn linear_triangles_that_lock_have_no_bars_and_say_so() {
+    let directory = TestDirectory::new();
+    directory.write("block.geo", BLOCK);
+    for (degree, plane, poisson, locks) in [
+        (1, "strain", 0.4999, true),
+        (1, "strain", 0.4, false),
+        (1, "stress", 0.4999, false),
+        (2, "strain", 0.4999, false),
+    ] {
+        let text = format!(
+            "mesh = {{ file = 'block.geo', size = 0.3 }}
+             discretisation.displacement = {degree}
+             material = {{ young = 100, poisson = {poisson}, plane = '{plane}' }}
+             boundary = [{{ name = 'near', displacement = [0, 0] }}, {{ name = 'far', gap = 0 }},
+                         {{ name = 'top', pressure = 1 }}]"
+        );
+        directory.write("scene.toml", &text);
+        let said = directory.run(&["--bars"]);
+        let bars =
+            directory.summary("out/scene")["errors"]["figures"].as_object().map(|of| of.len());
+        assert_eq!(bars.is_none_or(|count| count == 0), locks, "P{degree}, {plane}, {poisson}");
+        assert_eq!(said.contains("no error bars: a finer mesh does not show"), locks, "{said}");
+    }
+}

@@ -215,3 +215,27 @@ fn a_jump_of_the_gap_is_singular_and_a_continuous_gap_is_not() {
         );
     }
 }
+
+#[test]
+fn a_jump_of_a_shear_load_is_singular_and_a_jump_of_a_pressure_is_not() {
+    for (load, place) in [
+        ("traction = ['if(x < 0.5, 1, 0)', '0']", Some(0.5)),
+        ("traction = ['if(x < 0.53, 1, 2)', '-1']", Some(0.5)),
+        ("traction = ['if(x < 0.57, 1, 0)', 'x']", Some(0.6)),
+        ("traction = ['0', 'if(x < 0.5, 1, 0)']", None),
+        ("pressure = 'if(x < 0.53, 1, 0)'", None),
+        ("traction = ['x', 'sin(30*x)']", None),
+        ("traction = ['max(0, x - 0.53)', '1']", None),
+    ] {
+        let text = format!(
+            "material = {{ young = 1, poisson = 0.3, plane = 'stress' }}
+             boundary = [{{ name = 'top', {load} }}, {{ name = 'bottom', symmetry = true }}, {{ name = 'left', symmetry = true }}]"
+        );
+        let problem = problem(square(10), &text);
+        let points = problem.unwrap_or_else(|e| panic!("{e}")).singular_points();
+        assert_eq!(points.len(), usize::from(place.is_some()), "{load}: {points:?}");
+        let is_there =
+            |x: f64| (points[0].at[0] - x).abs() < 1e-9 && points[0].name.contains("jump");
+        assert!(place.is_none_or(is_there), "{load}: {points:?}");
+    }
+}

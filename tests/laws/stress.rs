@@ -2,7 +2,7 @@
 //! discontinuous where materials meet.
 
 use crate::support::{
-    ORDERS, bent, close, distorted, largest, layered, moved, order, problem, run, square,
+    ORDERS, bent, close, distorted, largest, layered, moved, order, problem, run, square, turn,
     unstructured,
 };
 use signorini::{
@@ -189,4 +189,35 @@ fn principal_stresses_and_the_direction_of_the_larger_one() {
     close(second, -1.0, 1e-14);
     close(x, cosine, 1e-14);
     close(y, sine, 1e-14);
+}
+
+/// Under a strip of pressure, −σ₂ is largest at the surface of the strip, and bounded at its ends: σ depends on the angle there.
+#[test]
+fn stresses_do_not_overshoot_where_a_load_jumps() {
+    for (degree, n) in [(1, 24), (2, 12)] {
+        for angle in [0.0, 0.7] {
+            // The end of the load is a vertex, or within an edge.
+            for end in [0.5, 0.47, 0.53, 0.55] {
+                let [c, s] = turn(angle, [1.0, 0.0]);
+                let text = format!(
+                    "discretisation.displacement = {degree}
+                     material = {{ young = {YOUNG}, poisson = 0, plane = 'stress' }}
+                     boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'right', symmetry = true }},
+                                 {{ name = 'bottom', symmetry = true }},
+                                 {{ name = 'top', pressure = 'if({c}*x + {s}*y < {end}, 1, 0)' }}]"
+                );
+                let mesh = moved(square(n), |x| turn(angle, x));
+                let problem = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"));
+                let [mut near, mut far] = [0.0_f64; 2];
+                for (at, stress) in stresses(&problem) {
+                    let [x, y] = turn(-angle, at);
+                    let is_near = (x - end).hypot(y - 1.0) < 4.0 / n as f64;
+                    let size = if is_near { &mut near } else { &mut far };
+                    *size = size.max(-principal(stress).0[1]);
+                }
+                println!("P{degree}, {angle}, {end}: {near} at the jump, {far} elsewhere");
+                assert!(near < 1.03 * far, "P{degree}, {angle}, {end}: {near}, {far}");
+            }
+        }
+    }
 }
