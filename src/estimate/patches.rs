@@ -33,7 +33,7 @@ pub(super) struct Patches {
     /// The quadrature points, m, `per_triangle` of them in each triangle.
     samples: Vec<[f64; 2]>,
     pub(super) per_triangle: usize,
-    /// The vertices of triangles at which a load jumps: strains differ there by angle, at any distance. Each takes their mean.
+    /// At a jump of a load strains differ by the angle, at any distance: these vertices take the mean. See [`Body`].
     near_jumps: Vec<bool>,
     /// Per material: its triangles around each vertex.
     around: Vec<TrianglesAround>,
@@ -76,13 +76,8 @@ impl Patches {
         let samples: Vec<_> = for_elements!(body, cells => sample_points(body, &cells));
         let last = body.materials.iter().copied().max().unwrap_or(0);
         let last = body.vertices.partition.comm().max(f64::from(last)) as usize;
-        let mut near_jumps = vec![false; body.mesh.nodes.len()];
-        let jumps =
-            |triangle: &&[usize; 3]| triangle.iter().any(|&v| body.jumps.get(v) == Some(&true));
-        let near = body.mesh.triangles.iter().filter(jumps).flatten();
-        near.for_each(|&vertex| near_jumps[vertex] = true);
         Self {
-            near_jumps,
+            near_jumps: body.near_jumps.clone(),
             vertices: body.mesh.nodes.clone(),
             triangles: body.mesh.triangles.clone(),
             owned: body.vertices.partition.owned(),
@@ -109,11 +104,12 @@ impl Patches {
     ) -> Result<Vec<Fit>, PetscError> {
         let Self { vertices, triangles, owned, samples, per_triangle: points, .. } = self;
         let degree = if *points > 1 { 2 } else { 1 };
+        let is_near = |vertex: usize| self.near_jumps.get(vertex) == Some(&true);
         let own_fit = |vertex: usize, degree: usize| {
             let own = around.of(vertex).iter().flat_map(|t| points * t..points * (t + 1));
             let (at, own) = (vertices[vertex], own.map(|q| (samples[q], strains[q])));
             match degree {
-                _ if self.near_jumps[vertex] => fit::<1>(at, own),
+                _ if is_near(vertex) => fit::<1>(at, own),
                 0 => fit::<1>(at, own),
                 1 => fit::<3>(at, own),
                 _ => fit::<6>(at, own),
@@ -122,9 +118,9 @@ impl Patches {
         let mut fields = vec![[0.0; ENTRIES]; vertices.len()];
         let known =
             |fit: Fit| std::array::from_fn(|i| fit.as_slice().get(i).copied().unwrap_or(1.0));
-        let is_known = |vertex: &usize| {
-            let count = around.of(*vertex).len();
-            count >= ENOUGH || (count > 0 && self.near_jumps[*vertex])
+        let is_known = |&vertex: &usize| {
+            let count = around.of(vertex).len();
+            count >= ENOUGH || (count > 0 && is_near(vertex))
         };
         for vertex in (0..*owned).filter(is_known) {
             fields[vertex] = known(own_fit(vertex, degree));

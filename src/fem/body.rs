@@ -21,8 +21,8 @@ pub struct Body {
     pub global_triangles: Vec<usize>,
     /// The number of the material of each triangle; empty if there is only one material.
     pub materials: Vec<u32>,
-    /// Per vertex: does a surface load jump there? Empty without jumps.
-    pub jumps: Vec<bool>,
+    /// Per vertex: is it in a triangle at a jump of a surface load? Empty without jumps.
+    pub near_jumps: Vec<bool>,
     /// The nodes of ζ: the vertices.
     pub vertices: Rc<Nodes>,
     /// The nodes of u: the vertices, and for P2 the midpoints of the edges.
@@ -100,7 +100,7 @@ impl Body {
             own_triangles,
             global_triangles: (0..own_triangles).collect(),
             materials: Vec::new(),
-            jumps: Vec::new(),
+            near_jumps: Vec::new(),
             vertices,
             nodes,
             quadratic,

@@ -195,8 +195,8 @@ impl Subdomain {
             elements: triangles.iter().map(|&t| undivided.elements[t]).collect(),
             middle: HashMap::default(),
         });
-        let jumps = &undivided.jumps;
-        let jumps = if jumps.is_empty() { Vec::new() } else { vertices.field(jumps, 1) };
+        let near = &undivided.near_jumps;
+        let near_jumps = if near.is_empty() { Vec::new() } else { vertices.field(near, 1) };
         let vertices = vertices.restrict(&undivided.vertices);
         Body {
             mesh,
@@ -206,7 +206,7 @@ impl Subdomain {
                 .iter()
                 .filter_map(|&t| undivided.materials.get(t).copied())
                 .collect(),
-            jumps,
+            near_jumps,
             global_triangles: triangles,
             nodes: match quadratic {
                 None => Rc::clone(&vertices),

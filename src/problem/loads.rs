@@ -6,7 +6,7 @@ mod jumps;
 mod parts;
 
 pub(crate) use curve::LoadCurve;
-pub(super) use jumps::{jump, load_jumps};
+pub(super) use jumps::{jump, near_jumps};
 pub(super) use parts::{centroid, edge_parts, triangle_parts, triangle_point};
 
 use super::{

@@ -35,7 +35,7 @@ pub(crate) use figures::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO, whole_and_parts};
 pub(crate) use load_case::LoadCase;
 pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
-use loads::load_jumps;
+use loads::near_jumps;
 pub(crate) use notes::NOTED;
 pub use notes::locks;
 pub(crate) use probe::OBSERVED;
@@ -102,11 +102,7 @@ impl DiscreteProblem {
         let mut body = Body::new(mesh, scene.order);
         body.materials = scene.materials_of(&body.mesh);
         let lines = Lines::boundary(&body.mesh);
-        let load_jumps = load_jumps(&scene, &body.mesh, &lines);
-        if !load_jumps.is_empty() {
-            body.jumps = vec![false; body.mesh.nodes.len()];
-            load_jumps.iter().for_each(|(vertex, _)| body.jumps[*vertex] = true);
-        }
+        body.near_jumps = near_jumps(&scene, &body.mesh, &lines);
         let mut conditions = BoundaryConditions::new(&scene, &body, &lines);
         let motions = conditions.resolve_motions(&body);
         let loads = Loads::new(&body, &scene, &mut conditions);

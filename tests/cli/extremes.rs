@@ -185,6 +185,10 @@ fn linear_triangles_that_lock_have_no_bars_and_say_so() {
         let bars =
             directory.summary("out/scene")["errors"]["figures"].as_object().map(|of| of.len());
         assert_eq!(bars.is_none_or(|count| count == 0), locks, "P{degree}, {plane}, {poisson}");
-        assert_eq!(said.contains("no error bars: a finer mesh does not show"), locks, "{said}");
+        assert_eq!(
+            said.out.contains("no error bars: a finer mesh does not show"),
+            locks,
+            "{said:?}"
+        );
     }
 }

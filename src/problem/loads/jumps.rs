@@ -2,9 +2,10 @@
 
 use crate::{
     mesh::{Lines, Mesh, sorted},
+    problem::{DiscreteProblem, SEEN, Singular},
     scene::{Condition, Scene, SurfaceLoad},
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A change is a jump if bisection leaves more than this fraction of the largest change on its way: of a continuous one it leaves
 /// 2⁻⁵⁰.
@@ -38,9 +39,20 @@ fn norm<const N: usize>(values: &[f64; N]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
+/// Per vertex: is it in a triangle at a jump of a surface load? Empty without jumps.
+pub(crate) fn near_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<bool> {
+    let jumps: BTreeSet<usize> =
+        load_jumps(scene, mesh, lines).into_iter().map(|(v, _)| v).collect();
+    let mut near = vec![false; if jumps.is_empty() { 0 } else { mesh.nodes.len() }];
+    let at_jump = |triangle: &&[usize; 3]| triangle.iter().any(|vertex| jumps.contains(vertex));
+    let here = mesh.triangles.iter().filter(|_| !jumps.is_empty()).filter(at_jump);
+    here.flatten().for_each(|&vertex| near[vertex] = true);
+    near
+}
+
 /// The vertices of smooth free boundaries at which, or within half of an edge of which, a surface load jumps; each with the
 /// largest jump (t_x, t_y, pressure), Pa. The sides of a support are left out: its reaction is not known.
-pub(crate) fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usize, [f64; 3])> {
+fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usize, [f64; 3])> {
     // Per edge its loads; `None` if it is supported.
     let mut edges = BTreeMap::<[usize; 2], Option<Vec<&SurfaceLoad>>>::new();
     for boundary in &scene.boundaries {
@@ -74,4 +86,26 @@ pub(crate) fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usiz
         (norm(&largest) > 0.0).then_some((node, largest))
     });
     found.collect()
+}
+
+impl DiscreteProblem {
+    /// The jumps of a shear load τ on smooth boundaries: nearby σ_tt grows like (2τ/π) ln r along the tangent t. A jump of the
+    /// normal load leaves stresses bounded.
+    pub(in crate::problem) fn shear_jumps(&self, lines: &Lines) -> Vec<Singular> {
+        let singular = |(node, [x, y, pressure]): (usize, [f64; 3])| {
+            let ends = &lines.ends[&node];
+            let [tx, ty] = lines.tangent(node, ends[0]);
+            let shear = (x * tx + y * ty).abs() / tx.hypot(ty);
+            let radius =
+                ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max);
+            let (at, name) = (self.mesh().nodes[node], "a jump of a shear load".to_owned());
+            (shear > SEEN * x.hypot(y).hypot(pressure)).then_some(Singular {
+                at,
+                radius,
+                name,
+                is_open: false,
+            })
+        };
+        load_jumps(self.scene(), self.mesh(), lines).into_iter().filter_map(singular).collect()
+    }
 }
