@@ -2,7 +2,7 @@
 
 use super::screen::{Shown, row};
 use signorini::{
-    estimate::{Extreme, Extremes, GROWS},
+    estimate::{Extreme, Extremes},
     scene::Units,
 };
 
@@ -15,8 +15,8 @@ pub(super) fn stresses(extremes: &Extremes, units: &Units, shown: &Shown) -> Vec
     let unit = &units.stress;
     let largest = extreme(von_mises, unit, shown);
     let grows = match von_mises.singular.as_deref() {
-        Some(place) if place != GROWS => format!(" at {place}, grows as the mesh is refined"),
-        _ => String::new(),
+        Some(place) => format!(" at {place}, grows as the mesh is refined"),
+        None => String::new(),
     };
     let [most, least] = [most, least].map(|of| extreme(of, unit, shown));
     let of_material = |of: &[Extreme; 3]| {
@@ -58,9 +58,7 @@ pub(super) fn place(quantities: &[(String, f64)], name: &str, shown: &Shown) -> 
 /// An extreme with its place: with its bar, or with two digits if the mesh does not determine it.
 fn extreme(extreme: &Extreme, unit: &str, shown: &Shown) -> String {
     let Extreme { name, value, at, singular, unresolved } = extreme;
-    let reason = match (singular.as_deref(), unresolved) {
-        // The place may be smooth: on finer meshes the extreme may lie elsewhere.
-        (Some(GROWS), _) => ": grows as the mesh is refined",
+    let reason = match (singular, unresolved) {
         (Some(_), _) => ": singular",
         (None, Some(_)) => ": not resolved",
         (None, None) => "",

@@ -22,6 +22,7 @@ mod measurement;
 mod few_step_run;
 mod progress;
 mod round;
+mod sequence;
 mod sizes;
 
 use crate::{
@@ -38,6 +39,7 @@ use limits::Limits;
 use measurement::Measurement;
 use progress::Progress;
 use round::Round;
+use sequence::Level;
 use serde::{Deserialize, Serialize};
 
 /// A mesh that was adapted to a scene.
@@ -70,8 +72,8 @@ pub struct Adapted {
 pub struct Measured {
     /// The error bars of the figures; empty if the run ends at ζ_*.
     pub bars: Vec<Bar>,
-    /// The names of the extremes that grow as the mesh is refined. They have no bars.
-    pub grows: Vec<String>,
+    /// The names of the extremes that the meshes do not settle. They have no bars.
+    pub unsettled: Vec<String>,
     /// The error bar of the time of ζ_*, s.
     pub stop: Option<f64>,
     /// The relative error of the damage ζ₀ − ζ in L² at the end; `None` without damage.
@@ -148,7 +150,6 @@ pub fn adapted(
     let mut few = scene.clone();
     few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
     let scene = with_passing_loads(session, few, &mesh, accuracy)?;
-    check_figures(&scene, &mesh)?;
     let mut reached = None;
     let refined = refined(session, scene, mesh, solver, accuracy, &mut |mesh| {
         seen(mesh);
@@ -163,7 +164,7 @@ pub fn adapted(
 }
 
 /// A scene with its few uniform steps, or with adaptive ones if loads or gaps pass by within a step. An error if the
-/// body turns over.
+/// body turns over, or has no figure of the name for which an accuracy is required.
 fn with_passing_loads(
     session: &Session,
     mut scene: Scene,
@@ -171,6 +172,9 @@ fn with_passing_loads(
     accuracy: f64,
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
+    let names = problem.figure_names();
+    let names = Vec::from_iter(names.iter().map(String::as_str));
+    scene.check_figures(&names).map_err(SetupError::from)?;
     if let Some(Collapse { time, .. }) = problem.collapse_on_a_point() {
         return Err(AdaptError::Overturns { time });
     }
@@ -204,25 +208,19 @@ pub fn measured_errors(
         few = with_passing_loads(session, few, mesh, FEW_STEP_TOLERANCE)?;
     }
     let mesh = Refinement::start(mesh.clone()).mesh;
+    let mut limits = Limits::new(session.comm(), scene);
     let (rounds, triangles) = (1, mesh.triangles.len());
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
-        let run = FewStepRun::run(session, &problem, solver, triangles, FEW, &[])
-            .map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, &[]);
+        let run = limits.measure(triangles, run);
+        let run = run.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
         if !repeats || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
-            return Ok(Measurement::new(session, &few, &mesh, &run, solver, rounds)?.result());
+            let new = Measurement::new(session, &mesh, &run, solver, &[], None, &mut limits);
+            return Ok(new?.result());
         }
     }
-}
-
-/// Checks that the figures for which `scene` requires an accuracy exist.
-fn check_figures(scene: &Scene, mesh: &Mesh) -> Result<(), SetupError> {
-    if scene.accuracy_of.is_empty() {
-        return Ok(());
-    }
-    let names = DiscreteProblem::new(scene.clone(), mesh.clone())?.figure_names();
-    Ok(scene.check_figures(&names.iter().map(String::as_str).collect::<Vec<_>>())?)
 }
 
 /// Refines `mesh` for a scene with few steps; an error if a run fails. A round is begun only if its measurement is within
@@ -239,6 +237,7 @@ fn refined(
     let mut refinement = Refinement::start(mesh);
     let mut rounds = 0;
     let (mut progress, mut limits) = (Progress::new(accuracy), Limits::new(session.comm(), &scene));
+    let mut before: Vec<Level> = Vec::new();
     loop {
         rounds += 1;
         let mesh = &refinement.mesh;
@@ -248,20 +247,21 @@ fn refined(
         let run = limits.measure(triangles, run);
         let run = run.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
         if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
+            before.clear();
             continue;
         }
         let round = Round::new(&scene, mesh, run, accuracy)?;
         progress.estimated(triangles, round.resolves_data().then(|| round.estimate()));
         // The measured errors, or the reason why there are none.
         let measure = |progress: &mut Progress, limits: &mut Limits| {
-            let new = || Measurement::new(session, &scene, mesh, &round.run, solver, rounds);
-            match limits.exceeded(&[4 * triangles]) {
-                Some(limit) => Ok(Err(limit)),
-                None => match limits.measure(4 * triangles, new) {
-                    Ok(measured) => Ok(Ok(progress.measured(triangles, measured))),
-                    Err(error) if error.signal().is_some() => Err(error),
-                    Err(error) => Ok(Err(error.to_string())),
-                },
+            if let Some(limit) = limits.exceeded(&[4 * triangles]) {
+                return Ok(Err(limit));
+            }
+            let (run, accuracy) = (&round.run, Some(accuracy));
+            match Measurement::new(session, mesh, run, solver, &before, accuracy, limits) {
+                Ok(measured) => Ok(Ok(progress.measured(triangles, measured))),
+                Err(error) if error.signal().is_some() => Err(error),
+                Err(error) => Ok(Err(error.to_string())),
             }
         };
         let is_enough = round.is_enough();
@@ -272,7 +272,7 @@ fn refined(
         };
         let errors = measured.as_ref().map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
         let limit = || "the limit on rounds is reached".to_owned();
-        let grown = measured.as_ref().and_then(|of| of.grown(&scene.accuracy_of));
+        let grown = measured.as_ref().and_then(|of| of.without_accuracy(&scene.accuracy_of));
         let within = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
         let reached = within && grown.is_none();
         let mut short = failed.or(grown).or_else(|| progress.stuck(&errors));
@@ -293,8 +293,12 @@ fn refined(
         }
         let adapted = round.adapted(measured.as_ref(), rounds, short);
         seen(&adapted);
+        let level = Level::new(&round.run, mesh.clone());
         match next {
-            Some(finer) => refinement = finer,
+            Some(finer) => {
+                before.push(level);
+                refinement = finer;
+            }
             None => return Ok(adapted),
         }
     }

@@ -4,15 +4,12 @@ use super::{Measured, NodalStress, principal, strained, stress::Point};
 use crate::{
     model::von_mises,
     petsc::{Communicator, PetscError},
-    problem::{
-        Bar, ContactRow, DiscreteProblem, SEEN, Singular, State, peak, rows_of, whole_and_parts,
-    },
+    problem::{Bar, ContactRow, DiscreteProblem, Singular, State, peak, rows_of, whole_and_parts},
 };
 use serde::Serialize;
-use std::f64::consts::FRAC_1_SQRT_2;
 
-/// The reason of a singular stress that only the measurement on a finer mesh shows.
-pub const GROWS: &str = "grows with refinement";
+/// The reason why an extreme is not resolved that grows from mesh to mesh.
+const UNSETTLED: &str = "the meshes do not settle it";
 
 /// An extreme of a state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,7 +23,7 @@ pub struct Extreme {
     pub at: [f64; 2],
     /// If the stress is singular there, and so grows as the mesh is refined: the reason.
     pub singular: Option<String>,
-    /// If it is at a peak of the contact pressure that the mesh does not resolve: the reason.
+    /// If the mesh does not resolve it, as at a peak of the contact pressure: the reason.
     pub unresolved: Option<String>,
 }
 
@@ -127,7 +124,7 @@ impl Extremes {
     }
 
     /// The extreme of the part in which the extreme `i` lies.
-    fn part_of(&self, i: usize) -> usize {
+    pub(super) fn part_of(&self, i: usize) -> usize {
         let size = |k: &usize| self.of_points[*k].size();
         self.parts(i).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(i)
     }
@@ -147,8 +144,8 @@ impl Extremes {
         }
     }
 
-    /// The extremes of `state` at the points of `nodal`. They name singular points and, if they were `measured`, say
-    /// which grow as the mesh is refined. Collective.
+    /// The extremes of `state` at the points of `nodal`. They name singular points. If they were `measured`, only those that
+    /// the meshes do not settle are singular or not resolved. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -164,9 +161,13 @@ impl Extremes {
         let mut extremes = Self::new(problem, state, nodal, &stresses);
         extremes.of_points = extremes.named(&problem.singular_points());
         for i in 0..extremes.of_points.len() {
-            let of = [i, extremes.part_of(i)];
-            if of.iter().any(|&k| measured.grows.contains(&extremes.of_points[k].name)) {
-                extremes.of_points[i].singular.get_or_insert_with(|| GROWS.to_owned());
+            let part = &extremes.of_points[extremes.part_of(i)].name;
+            let is_unsettled = measured.unsettled.contains(part);
+            let extreme = &mut extremes.of_points[i];
+            match is_unsettled {
+                true if extreme.is_known() => extreme.unresolved = Some(UNSETTLED.to_owned()),
+                false if !measured.bars.is_empty() => extreme.singular = None,
+                _ => {}
             }
         }
         Ok(extremes)
@@ -210,37 +211,5 @@ impl Extremes {
             nearest.filter(there).map(|point| point.name.clone())
         };
         self.of_points.iter().enumerate().map(named).collect()
-    }
-
-    /// The singular points at which the stress is not small: a finer mesh may show their peaks. Collective.
-    pub(super) fn stressed(&self, points: &[Singular]) -> Vec<[f64; 2]> {
-        /// Smaller stresses than this fraction of the largest are small.
-        const SMALL: f64 = 0.2;
-        let [field, ..] = &self.fields[..] else { return Vec::new() };
-        let is_stressed = |point: &&Singular| {
-            let own = field.iter().filter(|(_, at)| *at == point.at).map(|(value, _)| *value);
-            self.comm.max(own.fold(0.0, f64::max)) > SMALL * self.of_points[0].value
-        };
-        points.iter().filter(is_stressed).map(|point| point.at).collect()
-    }
-
-    /// Per extreme: does it grow like a singular stress? The mesh is to be fine around its place, finer than the `size`, m,
-    /// of triangles before. M_k is the largest value farther away than size/2^k, k = 1, 2, 3. A power r^(λ−1) with λ < 1 has increasing differences, and a
-    /// smooth field halves them with every k. Collective.
-    pub(super) fn grow(&self, size: impl Fn([f64; 2]) -> f64) -> Vec<bool> {
-        /// The ratio of the last difference to the one before above which the extreme grows: halfway between that of
-        /// r^½, as at an end of contact, and 1 for ln r.
-        const INCREASING: f64 = 0.5 * (1.0 + FRAC_1_SQRT_2);
-        let grows = |(extreme, field): (&Extreme, &Vec<(f64, [f64; 2])>)| {
-            let size = size(extreme.at);
-            let [a, b, c] = [0.5, 0.25, 0.125].map(|part| {
-                let far = |at: [f64; 2]| extreme.distance(at) >= 0.999 * part * size;
-                let values = field.iter().filter(|(_, at)| far(*at)).map(|(value, _)| *value);
-                self.comm.max(values.fold(0.0, f64::max))
-            });
-            c - b > SEEN * c && c - b > INCREASING * (b - a)
-        };
-        let grow: Vec<bool> = self.of_points.iter().zip(&self.fields).map(grows).collect();
-        (0..grow.len()).map(|i| grow[self.part_of(i)]).collect()
     }
 }

@@ -27,7 +27,7 @@ mod penetration;
 mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, INSTANTS, Measured, adapted, measured_errors};
-pub use extremes::{Extreme, Extremes, GROWS};
+pub use extremes::{Extreme, Extremes};
 pub use recovery::{EnergyError, RecoveredStrains};
 pub use stress::{NodalStress, Strained, principal};
 

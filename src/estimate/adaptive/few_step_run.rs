@@ -8,9 +8,7 @@ use crate::{
     evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State},
-    scene::APART,
 };
-use std::cmp::Ordering;
 
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated. On six bodies,
 /// half of them make a tenth more triangles; with twice a bar fails.
@@ -46,8 +44,9 @@ struct History {
     end: (Vec<f64>, f64, f64),
     /// The maximum penetration at an edge of each triangle at any time, m.
     depths: Vec<f64>,
-    /// The times of all steps, s, with their figures, except the extremes.
-    figures: Vec<(f64, Vec<f64>)>,
+    /// The times at which steps end, s, and the figures of the last one, except the extremes.
+    times: Vec<f64>,
+    figures: Vec<f64>,
     /// The maximum size of each figure, and of each extreme at the times at which errors are estimated.
     sizes: Vec<f64>,
     sizes_of_extremes: Vec<f64>,
@@ -102,11 +101,6 @@ impl<'a> FewStepRun<'a> {
         &self.history.depths
     }
 
-    /// ‖u‖² at the end, N m per metre of thickness, and the maximum at any time.
-    pub(super) fn energies(&self) -> [f64; 2] {
-        [self.history.end.2, self.history.energy]
-    }
-
     /// The scales of the figures. An extreme that `grows` is no scale of the others.
     pub(super) fn scales(&self, grows: &[String]) -> Vec<f64> {
         let History { sizes, sizes_of_extremes, energy, forces, .. } = &self.history;
@@ -120,15 +114,13 @@ impl<'a> FewStepRun<'a> {
     }
 
     /// The times at which steps end, s.
-    pub(super) fn times(&self) -> Vec<f64> {
-        self.history.figures.iter().map(|(time, _)| *time).collect()
+    pub(super) fn times(&self) -> &[f64] {
+        &self.history.times
     }
 
-    /// The first end of a step from `time` on, s, with the figures there, except the extremes.
-    pub(super) fn figures_from(&self, time: f64) -> &(f64, Vec<f64>) {
-        let figures = &self.history.figures;
-        let after = figures.partition_point(|(end, _)| *end < (1.0 - APART) * time);
-        &figures[after.min(figures.len() - 1)]
+    /// All figures at the end, the extremes last.
+    pub(super) fn values(&self) -> Vec<f64> {
+        [self.history.figures.clone(), self.extremes().values()].concat()
     }
 
     /// The extremes at the end.
@@ -148,39 +140,12 @@ impl<'a> FewStepRun<'a> {
         if open > 0.0 { open / self.history.sizes_of_extremes[length] } else { 0.0 }
     }
 
-    /// The points at which a finer mesh may change figures: probes, extremes, singular points, and min ζ; at ζ_* min ζ
-    /// alone. Collective.
-    pub(super) fn points(&self) -> Vec<[f64; 2]> {
-        let mut points = Vec::from_iter(self.problem.damage().map(|_| self.weakest()));
-        if self.stop().is_none() {
-            points.extend(self.problem.scene().probes.iter().map(|probe| probe.point));
-            let singular = self.problem.singular_points();
-            let extremes = self.extremes().named(&singular);
-            let finite = extremes.iter().filter(|extreme| extreme.singular.is_none());
-            points.extend(finite.map(|extreme| extreme.at));
-            points.extend(self.extremes().stressed(&singular));
-        }
-        points.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
-        points.dedup();
-        points
-    }
-
     /// The shares of the triangles in the squared interpolation error of the damage at the end, zeros if ζ_* was reached.
     /// Collective.
     pub(super) fn damage_shares(&self) -> Result<Vec<f64>, PetscError> {
         let shares = interpolation_shares(self.problem, &self.outcome.last.state)?;
         let stops = self.stop().is_some();
         Ok(self.gathered(&if stops { vec![0.0; shares.len()] } else { shares }))
-    }
-
-    /// The place of min ζ at the end, m. Collective.
-    fn weakest(&self) -> [f64; 2] {
-        let (body, zeta) = (&self.problem.body, &self.outcome.last.state.zeta);
-        let own = 0..body.vertices.partition.owned();
-        let weakest = own.min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
-        let comm = body.vertices.partition.comm();
-        let (_, rank) = comm.min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
-        weakest.map_or([0.0; 2], |i| body.mesh.nodes[i]).map(|x| comm.broadcast(rank, x))
     }
 
     /// ζ at the end at the vertices of each triangle of the undivided mesh. Collective.
@@ -223,6 +188,7 @@ impl History {
             displacement: 0.0,
             end: Default::default(),
             depths: vec![0.0; triangles],
+            times: Vec::new(),
             figures: Vec::new(),
             sizes: Vec::new(),
             sizes_of_extremes: Vec::new(),
@@ -235,7 +201,8 @@ impl History {
         let figures = step.figures();
         self.forces = step.forces;
         enlarge(&mut self.sizes, problem.figure_sizes(&figures));
-        self.figures.push((time, figures));
+        self.times.push(time);
+        self.figures = figures;
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
         let part = |time: f64| (self.instants as f64 * time / end + 1e-9).floor();
         let is_larger = step.record.displacement_max > LARGER * self.displacement;

@@ -1,9 +1,9 @@
-//! The mesh of a measurement: bisected everywhere, and more often around some points.
+//! The mesh of a measurement: bisected everywhere.
 
 use super::sizes::areas;
 use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
 
-/// A mesh whose triangles have half the size of those of a coarse mesh, and less around some points.
+/// A mesh whose triangles have half the size of those of a coarse mesh.
 pub(super) struct Finer {
     pub(super) mesh: Mesh,
     /// Per triangle: the triangle of the coarse mesh that contains it.
@@ -13,22 +13,14 @@ pub(super) struct Finer {
 }
 
 impl Finer {
-    /// Divides the triangles of `mesh` into parts of half their size, and those that touch one of the `points` into
-    /// parts of 1/2^`levels` of their size.
+    /// Divides the triangles of `mesh` into parts of half their size.
     ///
     /// # Errors
     /// A triangle cannot be bisected.
-    pub(super) fn new(mesh: &Mesh, points: &[[f64; 2]], levels: usize) -> Result<Self, MeshError> {
-        let mut refinement = Refinement::start(mesh.clone()).refine_everywhere()?;
-        let mut parents = refinement.parent_of_triangle.clone();
-        let mut halved_edges = refinement.halved_edges.clone();
-        // Two bisections halve the size.
-        for _ in 0..2 * (levels - 1) * usize::from(!points.is_empty()) {
-            refinement = refinement.refine(&touching(&refinement.mesh, points))?;
-            parents = refinement.parent_of_triangle.iter().map(|&t| parents[t]).collect();
-            halved_edges.extend(&refinement.halved_edges);
-        }
-        Ok(Self { mesh: refinement.mesh, parents, halved_edges })
+    pub(super) fn new(mesh: &Mesh) -> Result<Self, MeshError> {
+        let refinement = Refinement::start(mesh.clone()).refine_everywhere()?;
+        let Refinement { mesh, parent_of_triangle: parents, halved_edges, .. } = refinement;
+        Ok(Self { mesh, parents, halved_edges })
     }
 
     /// A field at the vertices, from its values at the vertices of the coarse mesh, affine on its triangles.

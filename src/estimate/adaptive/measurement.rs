@@ -1,43 +1,29 @@
-//! The measured errors of figures: the same few steps on the mesh bisected everywhere, and more often at points.
+//! The measured errors of figures: the same few steps on the mesh bisected everywhere, and on the meshes of the rounds before.
 //!
-//! This halves the size of all triangles, and an error of order p falls by 2^p. The figure F changes by
-//! F(h/2) − F(h) = (1 − 2^−p) e(h). So its error e(h) is twice the change for p = 1, and at most c times the
-//! change, with c = 2½ for p ≥ 0.74 in P2 and c = 4 for p ≥ 0.41 in P1. Both runs take
-//! the same time steps, so that these cause no change. The change at one time may be zero by chance, so the bar of a figure is
-//!
-//! c max(|ΔF(T)|, (mean over t of ΔF(t)²)^½).
-//!
-//! Extremes and probes may lie at singular points, where p is small. There the triangles become h/16: for p ≥ 0.2 the
-//! error is again at most 2½ times the change. The length of contact is known up to half of the edge at each end.
-//!
-//! A figure that depends on u has at least the bar η²/10 of its scale, with η the relative error of u in the
-//! energy norm: the relative error of the work of a constant load is η².
+//! The three meshes give the bars ([`Sequence`]). If no mesh before was much coarser, a mesh bisected twice is the third. All
+//! runs of a measurement take the same time steps, so that these cause no change.
 
 use super::{
     AdaptError, Measured,
-    changes::{bars, change_of_u, damage},
+    changes::damage,
     few_step_run::{FEW, FewStepRun},
-    finer::{Finer, size_at},
+    finer::Finer,
+    limits::Limits,
+    sequence::{Level, Sequence},
 };
 use crate::{
     evolution::AIM,
     mesh::{Mesh, Order},
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem},
-    scene::Scene,
 };
-use std::collections::BTreeSet;
-
-/// Maximum of error over change, for P1 and P2. On six bodies that are not shipped, with half of it six bars fail;
-/// with twice meshes have twice as many triangles.
-const ERROR_OVER_CHANGE: [f64; 2] = [4.0, 2.5];
-/// Triangles at points are h/2^this. With half of them some meshes have a quarter fewer
-/// triangles; twice of them change few meshes.
-const LEVELS: usize = 4;
 
 /// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest. Half of it
 /// makes about twice as many triangles; with twice, accuracies are missed.
 const SHARE: f64 = 0.97;
+
+/// A third mesh of at most so many triangles is always worth its run. On eight scenes, with half of it and with twice …
+const CHEAP: usize = 16_000;
 
 /// A measured error.
 pub(super) struct MeasuredError {
@@ -79,15 +65,12 @@ impl Cause {
 pub(super) struct Measurement {
     /// The error bars of the figures; empty if the run ends at ζ_*.
     pub(super) bars: Vec<Bar>,
-    /// The extremes that grow as the mesh is refined. They have no bars.
-    pub(super) grows: Vec<String>,
+    /// The extremes that the meshes do not settle. They have no bars.
+    pub(super) unsettled: Vec<String>,
     /// The error of ζ at the end over the damage, in L².
     pub(super) damage: f64,
-    /// The relative error of u: the estimate on the bisected mesh at the worst time. Without damage, the error by
-    /// the change of u at the end counts if it is larger.
+    /// The relative error of u: the estimate on the bisected mesh at the worst time.
     pub(super) displacement: f64,
-    /// The error of ‖u‖² over its maximum value.
-    pub(super) energy: f64,
     /// The error of the time of ζ_*, s, and this time; the error is infinite if only one of the two runs reaches it.
     pub(super) stop: Option<[f64; 2]>,
     /// Per triangle of the mesh: its share of the squared relative error of u, from the estimates on its parts, and
@@ -103,74 +86,120 @@ pub(super) struct Measurement {
 }
 
 impl Measurement {
-    /// Compares the run `coarse` of `scene` on `mesh` with the same run on the finer mesh. Collective.
+    /// Measures the errors of the run `coarse` on `mesh` by the same run on finer meshes, and by the answers on the meshes
+    /// `before`. A mesh bisected twice is left out if it exceeds the `limits`, and if two meshes show already whether the
+    /// `accuracy` is reached. Collective.
     ///
     /// # Errors
     /// A triangle cannot be bisected, or the run on the finer mesh fails.
     pub(super) fn new(
         session: &Session,
-        scene: &Scene,
         mesh: &Mesh,
         coarse: &FewStepRun,
         solver: &str,
-        rounds: usize,
+        before: &[Level],
+        accuracy: Option<f64>,
+        limits: &mut Limits,
     ) -> Result<Self, AdaptError> {
-        let points = coarse.points();
-        let finer = Finer::new(mesh, &points, LEVELS)?;
-        let triangles = finer.mesh.triangles.len();
-        let problem = DiscreteProblem::new(scene.clone(), finer.mesh.clone())?.restrict(session)?;
-        let times = coarse.times();
-        let fine = FewStepRun::run(session, &problem, solver, triangles, FEW, &times);
-        let fine = fine.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
-        let order = scene.order as usize;
-        let stop = match [coarse.stop(), fine.stop()] {
-            [None, None] => None,
-            [Some(before), Some(now)] => {
-                Some([ERROR_OVER_CHANGE[order] * (now - before).abs(), now])
-            }
-            [time, other] => time.or(other).map(|time| [f64::INFINITY, time]),
+        let scene = coarse.problem.scene();
+        let problem = |mesh: &Mesh| {
+            let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?;
+            problem.restrict(session).map_err(AdaptError::from)
         };
-        let (displacement, of_parts) = fine.relative();
-        let displacement = displacement.max(change_of_u(coarse, &fine));
-        // The squared error of order p on the whole triangle is 4^p times the sum on its parts.
-        let growth = if scene.order == Order::Quadratic { 16.0 } else { 4.0 };
-        let count = mesh.triangles.len();
-        let (mut shares, mut depths) = (vec![0.0; count], vec![0.0_f64; count]);
-        let parts = finer.parents.iter().zip(of_parts).zip(fine.depths());
-        for ((&parent, share), depth) in parts {
-            shares[parent] += growth * share;
-            depths[parent] = depths[parent].max(*depth);
+        let finer = Finer::new(mesh)?;
+        let triangles = finer.mesh.triangles.len();
+        let of_fine = problem(&finer.mesh)?;
+        let run = || FewStepRun::run(session, &of_fine, solver, triangles, FEW, coarse.times());
+        let failed = |source| AdaptError::Run { rounds: before.len() + 1, triangles, source };
+        let fine = limits.measure(triangles, run).map_err(failed)?;
+        let answer = Level::new(coarse, mesh.clone());
+        let mut levels = vec![Level::new(&fine, finer.mesh.clone())];
+        let two = Sequence::new(before, &answer, &levels);
+        let mut measured = Self::of_fields(&two, mesh, &finer, coarse, &fine);
+        measured.set_bars(&two, coarse, &fine);
+        let misses = |measured: &Self| {
+            let errors = measured.errors(&scene.accuracy_of);
+            accuracy.zip(errors.first()).is_some_and(|(a, worst)| worst.excess(a) > 1.0)
+        };
+        if two.has_coarser() || misses(&measured) {
+            return Ok(measured);
         }
-        let mut measured = Self { displacement, stop, shares, depths, ..Self::default() };
-        if stop.is_none() {
-            measured.compare(mesh, &finer, coarse, &fine);
+        measured.set_bars(&two.slower(), coarse, &fine);
+        let triangles = 4 * triangles;
+        let is_decided = accuracy.is_some() && triangles > CHEAP && !misses(&measured);
+        if is_decided || limits.exceeded(&[triangles]).is_some() {
+            return Ok(measured);
+        }
+        let finest = Finer::new(&finer.mesh)?.mesh;
+        let problem = problem(&finest)?;
+        let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, coarse.times());
+        if let Ok(run) = limits.measure(triangles, run) {
+            levels.push(Level::new(&run, finest));
+            measured.set_bars(&Sequence::new(before, &answer, &levels), coarse, &fine);
         }
         Ok(measured)
     }
 
-    /// Compares the figures of runs that do not reach ζ_*. Collective.
-    fn compare(&mut self, mesh: &Mesh, finer: &Finer, coarse: &FewStepRun, fine: &FewStepRun) {
-        let scene = coarse.problem.scene();
-        let factor = ERROR_OVER_CHANGE[scene.order as usize];
-        let [before, now] = [coarse, fine].map(|run| run.energies());
-        self.energy = match now[1] {
-            0.0 => 0.0,
-            largest => factor * (now[0] - before[0]).abs() / largest,
-        };
-        if coarse.problem.damage().is_some() {
-            (self.damage, self.zeta) = damage(mesh, finer, coarse, fine);
+    /// The errors of u and ζ, without bars of figures. Collective.
+    fn of_fields(
+        sequence: &Sequence,
+        mesh: &Mesh,
+        finer: &Finer,
+        coarse: &FewStepRun,
+        fine: &FewStepRun,
+    ) -> Self {
+        let problem = coarse.problem;
+        let mut measured = Self::default();
+        let (displacement, of_parts) = fine.relative();
+        measured.displacement = displacement;
+        // The squared error of order p on the whole triangle is 4^p times the sum on its parts.
+        let growth = if problem.scene().order == Order::Quadratic { 16.0 } else { 4.0 };
+        measured.shares = vec![0.0; mesh.triangles.len()];
+        measured.depths = measured.shares.clone();
+        for ((&parent, share), depth) in finer.parents.iter().zip(of_parts).zip(fine.depths()) {
+            measured.shares[parent] += growth * share;
+            measured.depths[parent] = measured.depths[parent].max(*depth);
         }
-        let extremes = fine.extremes();
-        let named = extremes.named(&coarse.problem.singular_points());
-        let probes = scene.probes.iter().map(|probe| (probe.name.clone(), probe.point));
+        if coarse.stop().or(fine.stop()).is_some() {
+            return measured;
+        }
+        if problem.damage().is_some() {
+            let (change, of_triangles) = damage(mesh, finer, coarse, fine);
+            (measured.damage, measured.zeta) =
+                (sequence.error_over_change() * change, of_triangles);
+        }
+        measured
+    }
+
+    /// Sets the bars of the figures, or of the time of ζ_*. Collective.
+    fn set_bars(&mut self, sequence: &Sequence, coarse: &FewStepRun, fine: &FewStepRun) {
+        self.stop = sequence.stop();
+        if self.stop.is_some() {
+            return;
+        }
+        let problem = coarse.problem;
+        let named = fine.extremes().named(&problem.singular_points());
+        let probes = problem.scene().probes.iter().map(|probe| (probe.name.clone(), probe.point));
         let of_extremes = named.iter().map(|extreme| (extreme.name.clone(), extreme.at));
         // A material may have the name of a probe.
         self.places = of_extremes.chain(probes).collect();
-        self.extremes = coarse.problem.extremes();
-        let grows = named.iter().zip(extremes.grow(|at| size_at(mesh, at)));
-        let grows = grows.filter(|(extreme, grows)| *grows || extreme.singular.is_some());
-        self.grows = grows.map(|(extreme, _)| extreme.name.clone()).collect();
-        self.bars = bars(coarse, fine, factor, &self.grows);
+        self.extremes = problem.extremes();
+        let count = problem.figure_names().len();
+        let first = count - self.extremes.len();
+        // The extreme of the whole settles if that of its part does.
+        let part = |i: usize| fine.extremes().part_of(i);
+        let settles = |&i: &usize| sequence.settles(first + part(i), &named[part(i)]);
+        let unsettled = (0..named.len()).filter(|i| !settles(i));
+        self.unsettled = unsettled.map(|i| named[i].name.clone()).collect();
+        let errors = Vec::from_iter((0..count).map(|i| sequence.error(i)));
+        self.bars = problem.bars(&errors, &fine.scales(&self.unsettled));
+        for (i, bar) in self.bars.iter_mut().enumerate() {
+            if bar.dimension == Dimension::ContactLength {
+                bar.bar = sequence.error_of_length(i);
+            }
+        }
+        self.bars.retain(|bar| !self.unsettled.contains(&bar.name));
+        coarse.extremes().join(&mut self.bars);
     }
 
     /// The names of the extremes.
@@ -179,14 +208,14 @@ impl Measurement {
     }
 
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.
-    pub(super) fn leave_out(&mut self, names: &BTreeSet<String>) {
+    pub(super) fn leave_out(&mut self, names: &[String]) {
         self.bars.retain(|bar| !names.contains(&bar.name));
-        self.grows.extend(names.iter().cloned());
+        self.unsettled.extend_from_slice(names);
     }
 
-    /// Why a figure in `names` has no accuracy, if one grows as the mesh is refined.
-    pub(super) fn grown(&self, names: &[String]) -> Option<String> {
-        let name = names.iter().find(|name| self.grows.contains(name))?;
+    /// Why a figure in `names` has no accuracy, if the meshes do not settle one.
+    pub(super) fn without_accuracy(&self, names: &[String]) -> Option<String> {
+        let name = names.iter().find(|name| self.unsettled.contains(name))?;
         Some(format!("{name} is singular: it grows as the mesh is refined; ask for other figures"))
     }
 
@@ -194,16 +223,15 @@ impl Measurement {
     pub(super) fn result(&self) -> Measured {
         let stop = self.stop.map(|[error, _]| error).filter(|error| error.is_finite());
         let damage = (!self.zeta.is_empty()).then_some(self.damage);
-        Measured { bars: self.bars.clone(), grows: self.grows.clone(), stop, damage }
+        Measured { bars: self.bars.clone(), unsettled: self.unsettled.clone(), stop, damage }
     }
 
-    /// The measured errors of the figures and norms in `names`, or of all: the figures, u, its energy, the damage
+    /// The measured errors of the figures and norms in `names`, or of all: the figures, u, the damage
     /// and the time of ζ_*. The largest error over its share comes first.
     pub(super) fn errors(&self, names: &[String]) -> Vec<MeasuredError> {
         let norms = [
             ("damage", self.damage, 1.0),
             ("displacement", self.displacement, 1.0),
-            ("energy", self.energy, 1.0),
             ("stopped_at", self.stop.map_or(0.0, |[error, time]| error / time), AIM),
         ];
         let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));

@@ -162,11 +162,10 @@ impl<'a> Round<'a> {
     ) -> Result<Refinement, MeshError> {
         /// With 1.05 nothing changes on six bodies; with 2 their meshes have half as many triangles again.
         const GROWTH: f64 = 1.3;
-        const GOALS: [f64; 5] = [1.0, 0.7, 0.5, 0.35, 0.25];
         let enough = measured.map_or(0.0, |_| GROWTH * self.mesh.triangles.len() as f64);
         let levels = self.levels(measured);
         let mut next = refinement.clone();
-        for goal in GOALS {
+        for goal in (0..5).map(|power| AIM.powi(power)) {
             next = divided(refinement.clone(), &self.size_ratios(measured, goal))?;
             next = sharpened(next, &levels)?;
             if next.mesh.triangles.len() as f64 >= enough {
