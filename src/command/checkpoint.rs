@@ -8,7 +8,7 @@ use super::{Failure, ranks::agree, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
     estimate::{Adapted, Measured},
-    evolution::{Outcome, RunState},
+    evolution::RunState,
     output::{self, FieldsWritten, OutputError},
     petsc::Communicator,
     scene::AsRun,
@@ -30,8 +30,8 @@ pub struct Checkpoint {
     origin: [u64; 3],
     /// The adapted mesh and its errors.
     pub adapted: Option<Adapted>,
-    /// In a repetition with shorter steps: the first run, the errors of the mesh, and the notes.
-    pub first: Option<(Outcome, Measured, Vec<String>)>,
+    /// In a repetition with shorter steps: the errors of the mesh, and the notes.
+    pub repeated: Option<(Measured, Vec<String>)>,
     pub recorded: Recorded,
     pub run: RunState,
 }
@@ -126,10 +126,9 @@ pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), Outpu
     let (comm, folder) = (task.problem.body.nodes.partition.comm(), &task.folder);
     let (step, adapted) = (run.last().record.step, task.adapted.clone());
     let path = path(folder, step, comm.rank());
-    let of_first = |outcome| (outcome, task.measured.clone(), task.notes.clone());
-    let first = task.first.clone().map(of_first);
+    let repeated = task.repeats.then(|| (task.measured.clone(), task.notes.clone()));
     let checkpoint =
-        Checkpoint { ranks: comm.size(), origin: origin(task), adapted, first, recorded, run };
+        Checkpoint { ranks: comm.size(), origin: origin(task), adapted, repeated, recorded, run };
     let write = || {
         let content = postcard::to_stdvec(&checkpoint).map_err(|e| OutputError::new(&path, e))?;
         let file = [FORMAT, &hash(&content).to_le_bytes(), &content].concat();

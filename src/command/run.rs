@@ -202,7 +202,7 @@ fn read<'a>(
         as_run,
         adapted,
         measured,
-        first: None,
+        repeats: false,
         notes,
         _lock: lock,
         _interrupts,
@@ -223,26 +223,23 @@ fn solve(
 ) -> Result<(), Failure> {
     let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&task));
     agree(session.comm(), checked)?;
-    let first = restart.as_mut().and_then(|checkpoint| checkpoint.first.take());
-    if let Some((outcome, measured, notes)) = first {
-        (task.first, task.measured, task.notes) = (Some(outcome), measured, notes);
+    let repeated = restart.as_mut().and_then(|checkpoint| checkpoint.repeated.take());
+    if let Some((measured, notes)) = repeated {
+        (task.repeats, task.measured, task.notes) = (true, measured, notes);
         show_again(session.comm());
     }
     loop {
         let started = Instant::now();
-        let (recorder, mut result) = solve_once(&task, restart.take(), session)?;
-        if let (Ok(outcome), Some(longer)) = (&mut result, &task.first) {
-            outcome.measure_steps(&task.problem, longer, &task.measured)?;
-        }
+        let (recorder, result) = solve_once(&task, restart.take(), session)?;
         let ratio = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
         let seconds = session.comm().max(started.elapsed().as_secs_f64());
         let ratio = ratio.filter(|ratio| has_time(&task, seconds, *ratio));
         match (result, ratio) {
-            (Ok(outcome), Some(ratio)) if task.first.is_none() => {
+            (Ok(outcome), Some(ratio)) if !task.repeats => {
                 drop(recorder);
                 confirm_stop(session, &mut task, &outcome)?;
                 task.shorten_steps(ratio);
-                task.first = Some(outcome);
+                task.repeats = true;
                 show_again(session.comm());
             }
             (result, _) => return finish(recorder, result, session.comm()),

@@ -2,7 +2,7 @@
 
 use signorini::{
     estimate::{Adapted, Measured},
-    evolution::{Outcome, Phases},
+    evolution::Phases,
     interrupt::Interrupts,
     problem::DiscreteProblem,
     scene::AsRun,
@@ -26,8 +26,8 @@ pub struct Task<'a> {
     pub adapted: Option<Adapted>,
     /// The measured errors of the mesh; empty if they were not measured.
     pub measured: Measured,
-    /// In a repetition with shorter steps: the run before.
-    pub first: Option<Outcome>,
+    /// Is this a repetition with shorter steps?
+    pub repeats: bool,
     /// Notes on the arguments and on the error bars.
     pub notes: Vec<String>,
     /// The lock of the folder against other runs.

@@ -6,26 +6,41 @@ use crate::{
     petsc::PetscError,
     problem::{DiscreteProblem, State},
 };
+use nalgebra::DVector;
 use std::collections::BTreeMap;
 
 impl ErrorBudget {
-    /// The budget of the last accepted state, from the estimated error `steps` of its ζ. Collective.
-    pub(super) fn new(problem: &DiscreteProblem, outcome: &Outcome, steps: Option<&[f64]>) -> Self {
+    /// The budget of the last accepted state, from the error of its ζ by the `steps` and its error bar. Collective.
+    pub(super) fn new(
+        problem: &DiscreteProblem,
+        outcome: &Outcome,
+        steps: Option<[DVector<f64>; 2]>,
+    ) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
+        let (body, zeta) = (&problem.body, DVector::from_column_slice(&state.zeta));
         let caused = |error: &[f64]| problem.displacement_error_of(error, state);
+        let min_max = |field: &[f64]| body.vertices.partition.min_max(field);
+        let error = steps.as_ref().map(|[error, _]| error.as_slice());
+        let bars = |[error, bar]: &[DVector<f64>; 2]| {
+            // The true minimum lies between the minima of ζ − bar and of ζ + bar.
+            let [low, min, high] =
+                [&zeta - bar, zeta.clone(), &zeta + bar].map(|zeta| min_max(zeta.as_slice()).0);
+            let doubt = bar - error.abs();
+            let mean = body.mean(error.as_slice()).abs() + body.mean(doubt.as_slice());
+            let of_zeta = [min_max(bar.as_slice()).1, (min - low).max(high - min), mean];
+            // 0 < ζ ≤ 1 bounds every error of ζ.
+            let [most, min, mean] = of_zeta.map(|bar| bar.min(1.0));
+            [most, min, mean, caused(bar.as_slice())]
+        };
         Self {
             displacement_mesh: accuracy.energy,
             damage_mesh: None,
-            displacement_steps: steps.map(caused),
-            damage_steps: steps.and_then(|error| problem.relative_to_damage(error, state)),
+            displacement_steps: error.map(caused),
+            damage_steps: error.and_then(|error| problem.relative_to_damage(error, state)),
             solver: accuracy.displacement,
             figures: BTreeMap::new(),
             can_be_damaged: problem.damage().is_some(),
-            zeta_steps: steps.map(|error| {
-                let (low, high) = problem.body.vertices.partition.min_max(error);
-                // 0 < ζ ≤ 1 bounds every error of ζ.
-                [high.max(-low), problem.body.mean(error).abs()].map(|error| error.min(1.0))
-            }),
+            bars_of_steps: steps.as_ref().map(bars),
         }
     }
 }

@@ -34,15 +34,13 @@ pub use stress::{NodalStress, Strained, principal};
 use crate::{
     ROUNDING,
     evolution::{
-        Callback, DamageStep, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError,
-        RunState, Step, all_steps,
+        Callback, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError, RunState, Step,
+        all_steps,
     },
     fem::RigidMotion,
     petsc::{PetscError, Session},
     problem::{Bar, DiscreteProblem, State},
-    scene::{Stepping, TimeGrid},
 };
-use nalgebra::DVector;
 use std::borrow::Cow;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
@@ -77,28 +75,9 @@ pub fn run_from(
     estimated(all_steps(session, problem, solver, phases, observer, saved, &[])?)
 }
 
-/// Whether the damage of a run with equal steps begins with its last ones: one more step would do far more damage than all
-/// before. The differences of the steps say nothing of their error then. Means are compared, as diffusion does not change
-/// them: at a singular point the source alone is far larger than what it does. Collective.
-fn begins_at_the_end(damage_step: &DamageStep, outcome: &Outcome) -> bool {
-    const FAR_MORE: f64 = 5.0;
-    let (problem, state) = (damage_step.problem, &outcome.last.state);
-    let Some(TimeGrid { end, stepping: Stepping::Uniform { steps }, .. }) = problem.scene().time
-    else {
-        return false;
-    };
-    let vertices = &problem.body.vertices;
-    let owned = vertices.partition.owned();
-    let source: f64 = damage_step.source(state).load.iter().take(owned).sum();
-    let mean_rate = -vertices.partition.comm().total(source) / problem.body.area;
-    let next = mean_rate * end / steps as f64;
-    let done = problem.body.mean(&problem.initial_damage()) - problem.body.mean(&state.zeta);
-    next > FAR_MORE * done && next > f64::EPSILON
-}
-
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {
-    let Run { damage_step, contact_step, controller, mut outcome } = run;
+    let Run { mut damage_step, contact_step, mut controller, mut outcome } = run;
     let mut fixed_contact = contact_step.into_fixed_contact()?;
     let (problem, phases) = (damage_step.problem, damage_step.phases);
     outcome.accuracy = phases.time("accuracy", || fixed_contact.accuracy(&outcome))?;
@@ -106,9 +85,11 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
     outcome.penetration = phases.time("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
-    let is_known = problem.damage().is_some() && !begins_at_the_end(&damage_step, &outcome);
-    let steps = controller.step_error().filter(|_| is_known && outcome.stopped.is_none());
-    outcome.errors = ErrorBudget::new(problem, &outcome, steps.as_ref().map(DVector::as_slice));
+    let is_known = problem.damage().is_some()
+        && outcome.stopped.is_none()
+        && controller.add_last_error(&mut damage_step).is_ok();
+    let steps = is_known.then(|| [controller.step_error(), controller.step_bar()]);
+    outcome.errors = ErrorBudget::new(problem, &outcome, steps);
     Ok(outcome)
 }
 
@@ -143,7 +124,7 @@ impl Outcome {
         problem: &DiscreteProblem,
         measured: &Measured,
     ) -> Result<(), PetscError> {
-        let unknown = problem.damage().is_some() && self.errors.zeta_steps.is_none();
+        let unknown = problem.damage().is_some() && self.errors.bars_of_steps.is_none();
         if let Some(stop) = &mut self.stopped {
             stop.from_mesh = measured.stop;
             return Ok(());
@@ -153,12 +134,44 @@ impl Outcome {
             return Ok(());
         }
         self.bars = measured.bars.clone();
-        let [most, mean] = self.errors.zeta_steps.unwrap_or_default();
-        let displacement = self.errors.displacement_steps.unwrap_or(0.0);
-        problem.add_step_errors(&mut self.bars, [most, mean, displacement]);
         let (state, nodal) = (&self.last.state, NodalStress::new(problem));
-        self.set_bars_of_extremes(&Extremes::of(problem, state, &nodal, measured)?);
+        let extremes = Extremes::of(problem, state, &nodal, measured)?;
+        let now = self.set_scales(problem, &extremes, measured);
+        let of_steps = self.errors.bars_of_steps.unwrap_or_default();
+        problem.add_step_errors(&mut self.bars, &now, of_steps);
+        self.set_bars_of_extremes(&extremes);
         Ok(())
+    }
+
+    /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end
+    /// in a less damaged state: their relative errors count. Returns the scales of the bars in the last state. An extreme
+    /// that grows is no scale.
+    fn set_scales(
+        &mut self,
+        problem: &DiscreteProblem,
+        extremes: &Extremes,
+        measured: &Measured,
+    ) -> Vec<f64> {
+        let grows = |name: &String| measured.unsettled.contains(name);
+        let of_extremes = problem.extremes().into_iter().zip(extremes.values());
+        let of_extremes =
+            of_extremes.map(|(name, size)| if grows(&name) { 0.0 } else { size.abs() });
+        let of_extremes = Vec::from_iter(of_extremes);
+        let names = problem.figure_names();
+        let scales = |sizes: &[f64], forces: f64| {
+            let scales = problem.figure_scales(&[sizes, &of_extremes].concat(), 0.0, forces);
+            let of = |bar: &Bar| names.iter().position(|name| *name == bar.name);
+            Vec::from_iter(self.bars.iter().map(|bar| of(bar).map_or(0.0, |i| scales[i])))
+        };
+        let largest = scales(&self.sizes, self.last.forces);
+        let now = scales(&problem.figure_sizes(&self.last.figures()), 0.0);
+        for (bar, scale) in self.bars.iter_mut().zip(largest) {
+            if scale > bar.scale && bar.scale > 0.0 {
+                bar.bar *= scale / bar.scale;
+                bar.scale = scale;
+            }
+        }
+        now
     }
 
     /// Sets the bars of the extremes of the whole, and enters the bars in the errors, except those of extremes that the mesh
@@ -169,49 +182,5 @@ impl Outcome {
             |bar: &&Bar| extremes.of_points.iter().any(|of| of.name == bar.name && !of.is_known());
         let known = self.bars.iter().filter(|bar| !unknown(bar));
         self.errors.figures = known.map(|bar| (bar.name.clone(), bar.bar)).collect();
-    }
-
-    /// Measures the errors of the time steps by the run `longer`, whose steps had a larger tolerance. Errors are of
-    /// second order: with r the square of the ratio of the numbers of steps, the error of a figure F is r/(1 − r) times
-    /// the change of F; twice this counts, and at least half of the change. Where this is less than the estimate, it
-    /// takes its place, as far down as the part of the estimate that did not grow in later steps. The estimated growth
-    /// assumes strains proportional to 1/ζ, which prescribed displacements prevent. If a load makes ζ fall without bound, the
-    /// error of the time of ζ_* is of first order. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn measure_steps(
-        &mut self,
-        problem: &DiscreteProblem,
-        longer: &Outcome,
-        measured: &Measured,
-    ) -> Result<(), PetscError> {
-        let [before, now] = [longer, &*self].map(|run| run.last.record.step as f64);
-        let ratio = (before / now).powi(2);
-        if ratio >= 1.0 || longer.stopped.is_some() != self.stopped.is_some() {
-            return Ok(());
-        }
-        let factor = (2.0 * ratio / (1.0 - ratio)).max(0.5);
-        if let (Some(stop), Some(other)) = (&mut self.stopped, longer.stopped) {
-            let first_order = before / (now - before);
-            let measured = factor.max(first_order) * (stop.time - other.time).abs();
-            stop.uncertainty = stop.uncertainty.min(measured.max(self.ungrown * stop.uncertainty));
-        }
-        let nodal = NodalStress::new(problem);
-        let [before, extremes] =
-            [longer, &*self].map(|run| Extremes::of(problem, &run.last.state, &nodal, measured));
-        let (before, extremes) = (before?, extremes?);
-        let [before, now] = [(&longer.last, &before), (&self.last, &extremes)]
-            .map(|(step, extremes)| [step.figures(), extremes.values()].concat());
-        let names = problem.figure_names();
-        for (bar, of_mesh) in self.bars.iter_mut().zip(&measured.bars) {
-            if let Some(i) = names.iter().position(|name| *name == bar.name) {
-                let estimated = bar.bar - of_mesh.bar;
-                let measured = factor * (now[i] - before[i]).abs() + problem.tolerance * bar.scale;
-                bar.bar = of_mesh.bar + estimated.min(measured.max(self.ungrown * estimated));
-            }
-        }
-        self.set_bars_of_extremes(&extremes);
-        Ok(())
     }
 }

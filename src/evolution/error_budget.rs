@@ -24,9 +24,10 @@ pub struct ErrorBudget {
     /// Can the material be damaged?
     #[serde(skip)]
     pub can_be_damaged: bool,
-    /// The error of ζ from the time steps, at a node and in the mean.
+    /// The error bars from the time steps: the largest of ζ at a node, of min ζ, of mean ζ, and of u, relative, in the
+    /// energy norm.
     #[serde(skip)]
-    pub(crate) zeta_steps: Option<[f64; 2]>,
+    pub(crate) bars_of_steps: Option<[f64; 4]>,
 }
 
 /// If all errors are below this, there is no advice.

@@ -103,7 +103,7 @@ pub(crate) fn all_steps<'a>(
         source = damage_step.source(&first.state);
     }
     let controller = StepController::new(problem, &zeta, source, followed);
-    let outcome = Outcome::new(first);
+    let outcome = Outcome::new(first, problem);
     let mut run = Run { damage_step, contact_step, controller, outcome };
     match saved {
         None => run.report(observer)?,
@@ -116,7 +116,6 @@ pub(crate) fn all_steps<'a>(
     }
     while run.step(observer)? {}
     run.outcome.bound_violation = run.controller.violation();
-    run.outcome.ungrown = run.controller.ungrown();
     run.outcome.damage_error = run.controller.damage_error();
     Ok(run)
 }
@@ -149,7 +148,7 @@ impl Run<'_> {
             Decision::Accept(mut step) => {
                 contact_step.accept(planned.time)?;
                 step.record.seconds = started.elapsed().as_secs_f64();
-                outcome.accept(*step);
+                outcome.accept(*step, damage_step.problem);
                 self.report(observer)?;
             }
             Decision::Retry => outcome.rejected += 1,

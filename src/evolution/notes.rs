@@ -104,8 +104,7 @@ impl Outcome {
         };
         (missed == misses).then(|| {
             format!(
-                "{} steps chosen: the time error of the damage is about {} of it, or three times as much \
-                 if the load jumps{advice}",
+                "{} steps chosen: the time error of the damage is about {} of it{advice}",
                 self.last.record.step,
                 percent(error)
             )

@@ -1,7 +1,7 @@
 //! The outcome of a run that did not fail.
 
 use super::{
-    Accuracy, ErrorBudget, Step, StepRecord,
+    Accuracy, DiscreteProblem, ErrorBudget, Step, StepRecord,
     damage_step::{MAX_BALANCE, PlannedStep},
 };
 use crate::{
@@ -47,15 +47,14 @@ pub struct Outcome {
     /// A note on contact between the nodes.
     #[serde(skip)]
     pub(crate) penetration: Option<String>,
-    /// The error of the time steps had it not grown, over the estimated one.
-    #[serde(skip)]
-    pub(crate) ungrown: f64,
     /// Estimated error of the last ζ over the damage done, for adaptive steps.
     #[serde(skip)]
     pub damage_error: Option<f64>,
     /// The steps with the maximum stationarity residual and the maximum displacement before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
     most_displaced: Option<Rc<Step>>,
+    /// The maximum size of each figure in the run, except the extremes.
+    pub(crate) sizes: Vec<f64>,
 }
 
 /// The stop at ζ_*.
@@ -83,9 +82,9 @@ impl Stop {
 
 impl Outcome {
     /// The outcome of a run after its first solve, (27).
-    pub(super) fn new(first: Step) -> Self {
+    pub(super) fn new(first: Step, problem: &DiscreteProblem) -> Self {
         let mut outcome = Self { last: first, ..Self::default() };
-        outcome.count_last();
+        outcome.count_last(problem);
         outcome
     }
 
@@ -96,7 +95,7 @@ impl Outcome {
         self.most_displaced.as_ref().filter(larger).map_or(&self.last, Rc::as_ref)
     }
 
-    pub(super) fn accept(&mut self, step: Step) {
+    pub(super) fn accept(&mut self, step: Step, problem: &DiscreteProblem) {
         let before = Rc::new(mem::replace(&mut self.last, step));
         let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {
             if kept.as_ref().is_none_or(|kept| of(&before.record) > of(&kept.record)) {
@@ -105,10 +104,13 @@ impl Outcome {
         };
         keep_larger(&mut self.least_accurate, |record| record.kkt_stationarity);
         keep_larger(&mut self.most_displaced, |record| record.displacement_max);
-        self.count_last();
+        self.count_last(problem);
     }
 
-    fn count_last(&mut self) {
+    fn count_last(&mut self, problem: &DiscreteProblem) {
+        let sizes = problem.figure_sizes(&self.last.figures());
+        self.sizes.resize(sizes.len(), 0.0);
+        self.sizes.iter_mut().zip(sizes).for_each(|(most, size)| *most = most.max(size));
         let Step { record, report, unconstrained, .. } = &self.last;
         self.kkt = self.kkt.max(&record.kkt());
         self.skipped_damage_solves += usize::from(self.last.skipped_damage_solve);

@@ -1,7 +1,6 @@
 //! The figures that a run prints, and their error bars.
 
 use super::{DiscreteProblem, notes::TIMES};
-use crate::scene::Stepping;
 use serde::{Deserialize, Serialize};
 use std::iter;
 
@@ -21,8 +20,6 @@ const MIN_SCALE: f64 = 1e-3;
 /// small about any point near the line of its force. The scale of a stress is at least this fraction of the mean stress
 /// of the body, about √(E ‖u‖²/|Ω|): a stress at a free corner is zero.
 const MIN_PART: f64 = 0.1;
-/// The error of uniform time steps over its estimate.
-const UNIFORM: f64 = 2.5;
 /// A damage below this is negligible.
 pub(crate) const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
@@ -201,18 +198,15 @@ impl DiscreteProblem {
     /// Adds to the error bars the solver's tolerance and the errors of the loads' integrals, which all meshes
     /// of a measurement may have, and of the time steps.
     ///
-    /// The steps change ζ by at most `most` at a node and by `mean` on average, and so u by `displacement`
-    /// (relative, energy norm): u depends on the past only through ζ. The error of uniform steps is multiplied:
-    /// few of them, or loads of infinite slope, show less than half of it.
-    pub(crate) fn add_step_errors(&self, bars: &mut [Bar], of_steps: [f64; 3]) {
-        let grid = self.scene().time.map(|grid| grid.stepping);
-        let uniform = matches!(grid, Some(Stepping::Uniform { .. }));
-        let [most, mean, displacement] = of_steps.map(|e| if uniform { UNIFORM * e } else { e });
+    /// u depends on the past, and so on the steps, only through ζ: their errors are relative to the scales `now`, in the last
+    /// state.
+    pub(crate) fn add_step_errors(&self, bars: &mut [Bar], now: &[f64], of_steps: [f64; 4]) {
         let [force, of_loads] =
             self.loads.integral_errors(&self.body, &self.scene().sample_times(TIMES));
         let lever =
             self.body.radius_of_gyration() + self.body.centroid[0].hypot(self.body.centroid[1]);
-        for bar in bars {
+        let [zeta, zeta_min, zeta_mean, displacement] = of_steps;
+        for (bar, now) in bars.iter_mut().zip(now) {
             bar.bar += self.tolerance * bar.scale;
             bar.bar += match bar.dimension {
                 Dimension::Damage => 0.0,
@@ -222,11 +216,12 @@ impl DiscreteProblem {
                 _ => of_loads * bar.scale,
             };
             bar.bar += match bar.dimension {
-                Dimension::Damage if bar.name == "zeta_mean" => mean,
-                Dimension::Damage => most,
+                Dimension::Damage if bar.name == "zeta_min" => zeta_min,
+                Dimension::Damage if bar.name == "zeta_mean" => zeta_mean,
+                Dimension::Damage => zeta,
                 // σ = ζ𝒜ε(u).
-                Dimension::Stress => (displacement + most) * bar.scale,
-                _ => displacement * bar.scale,
+                Dimension::Stress => (displacement + zeta) * now,
+                _ => displacement * now,
             };
         }
     }

@@ -65,9 +65,12 @@ fn error_bars_are_measured_where_they_are_asked_for() {
     for key in ["work", "displacement_max", "zeta_min", "bottom.force_y"] {
         assert!(bars[key].as_f64().unwrap() > 0.0, "{key}");
     }
-    // One step does not show what it does to ζ.
+    // The source at its end shows the error of a single step.
+    let fine = summary["zeta_min"].as_f64().unwrap();
     test_directory.run(&["--bars", "--set", "time.step=1"]);
-    assert_eq!(test_directory.summary("out/scene")["errors"]["figures"], serde_json::json!({}));
+    let summary = test_directory.summary("out/scene");
+    let error = (summary["zeta_min"].as_f64().unwrap() - fine).abs();
+    assert!(error < summary["errors"]["figures"]["zeta_min"].as_f64().unwrap(), "{error}");
     test_directory.run(&[]);
     assert_eq!(test_directory.summary("out/scene")["errors"]["figures"], serde_json::json!({}));
 }
@@ -279,7 +282,9 @@ fn a_stop_by_the_error_of_the_steps_is_not_reached() {
         let said = directory.run(&["--accuracy", accuracy]);
         let summary = directory.summary("out/scene");
         let survives = summary["stopped_at"].is_null();
-        assert!(survives || said.out.contains("NOT reached (only this run stops"), "{}", said.out);
+        let is_unconfirmed =
+            ["NOT reached", "only this run stops"].iter().all(|w| said.out.contains(w));
+        assert!(survives || is_unconfirmed, "{}", said.out);
         if let (true, Some(bar)) = (survives, summary["errors"]["figures"]["zeta_min"].as_f64()) {
             let error = (summary["zeta_min"].as_f64().unwrap() - 0.01643).abs();
             assert!(error <= bar, "{accuracy}: {error} exceeds {bar}");
@@ -306,17 +311,20 @@ fn a_stop_between_few_steps_is_reached_with_a_bar_that_holds() {
 }
 
 /// A bar that the foundation reaches at 0.95 of its time: |ε| = 0.02 (t − 0.95), ½ λ_U |ε|² is about 1 at the end. Steps of
-/// 0.05 and 0.04 do not show the damage that has begun.
+/// 0.05 and 0.04 do no damage; the source at the end shows the damage that has begun.
 #[test]
-fn there_are_no_bars_where_the_damage_begins_with_the_last_step() {
+fn bars_hold_where_the_damage_begins_with_the_last_step() {
     let directory = TestDirectory::new();
     let damage = "diffusion = 0.1, lambda_d = 1, lambda_u = 4e6";
     write_bar(&directory, 1e9, damage, "gap = '0.019 - 0.02*t'");
-    for (step, is_known) in [("0.05", false), ("0.04", false), ("0.01", true)] {
+    directory.run(&["--set", "time.step=0.0005"]);
+    let exact = directory.summary("out/scene")["zeta_min"].as_f64().unwrap();
+    for step in ["0.05", "0.04", "0.01"] {
         let said = directory.run(&["--bars", "--set", &format!("time.step={step}")]);
-        let figures = &directory.summary("out/scene")["errors"]["figures"];
-        assert_eq!(!figures["zeta_min"].is_null(), is_known, "{}", said.out);
-        assert_eq!(!said.out.contains("the damage begins with the last"), is_known, "{}", said.out);
+        let summary = directory.summary("out/scene");
+        let error = (summary["zeta_min"].as_f64().unwrap() - exact).abs();
+        let bar = summary["errors"]["figures"]["zeta_min"].as_f64().unwrap();
+        assert!(error <= bar && bar < 5.0 * error, "{error} is not {bar}: {}", said.out);
     }
 }
 

@@ -1,26 +1,35 @@
 //! The errors of ζ from the time steps, and their growth.
 
-use super::{PlannedStep, StepController};
+use super::{DamageStep, PlannedStep, RunError, StepController};
 use nalgebra::DVector;
 
 impl StepController<'_> {
-    /// The estimated error of the last accepted ζ from the time steps, at the nodes. `None` before the first step,
-    /// and before Euler's second step, which shows the error of the first.
-    pub(crate) fn step_error(&self) -> Option<DVector<f64>> {
-        Some(&self.memory.error + self.memory.last_error.as_ref()?)
+    /// The estimated error E of the last accepted ζ from the time steps, at the nodes.
+    pub(crate) fn step_error(&self) -> DVector<f64> {
+        &self.memory.error + &self.memory.last_error
     }
 
-    /// ∫ ζ' over a step of k = `length`, s, from its rate f_n and f_n − f_{n−1} = `change` to third order:
-    /// k (f_n − ½ (f_n − f_{n−1}) − ω/(6 (1+ω)) ((f_n − f_{n−1}) − ω (f_{n−1} − f_{n−2}))).
-    pub(super) fn integrated(
-        &self,
-        length: f64,
-        rate: &DVector<f64>,
-        change: &DVector<f64>,
-    ) -> DVector<f64> {
-        let omega = length / self.memory.length;
-        let curvature = change - omega * &self.memory.rate_change;
-        length * (rate - 0.5 * change - omega / (6.0 * (1.0 + omega)) * curvature)
+    /// The error bar of ζ from the time steps, at the nodes: |E| + Σ|d| with the doubts d of the steps. The errors of loads
+    /// that rise and fall cancel in E, their doubts do not.
+    pub(crate) fn step_bar(&self) -> DVector<f64> {
+        self.step_error().abs() + &self.memory.doubt
+    }
+
+    /// After the last step: adds the error of Euler's last step, which the rate of one more step shows. Collective.
+    ///
+    /// # Errors
+    /// That step has no answer.
+    pub(crate) fn add_last_error(&mut self, damage_step: &mut DamageStep) -> Result<(), RunError> {
+        let length = self.memory.length;
+        if self.two_step || length.is_infinite() {
+            return Ok(());
+        }
+        let (start, load) = (self.memory.zeta.clone(), self.memory.source.load.clone());
+        let (n, time, bounds) = (0, 0.0, self.memory.bounds);
+        let planned = PlannedStep { n, time, length, k: length, start, load, bounds };
+        let zeta = damage_step.solve(&planned)?.zeta;
+        self.add_euler_error(&planned, &planned.rate(&zeta));
+        Ok(())
     }
 
     /// Adds the error of the previous Euler step; `rate` is the rate of this step: (28) takes the source at the
@@ -29,57 +38,52 @@ impl StepController<'_> {
         if let Some(before) = &self.memory.rate {
             let error = 0.5 * planned.k * (rate - before);
             let (zeta, mean) = (self.memory.zeta.clone(), 0.5 * (rate + before));
-            self.add_error(planned.length, &error, &zeta, &mean);
-            self.memory.last_error = Some(error);
+            self.add_error(planned.length, &error, &error, &zeta, &mean);
         }
     }
 
-    /// Adds the `error` of a step of `length` s to `zeta` with the mean `rate`. Earlier errors grow by the factor
-    /// exp(∫g), with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law, by the trapezoidal
-    /// rule.
+    /// Adds the `error` of a step of `length` s to `zeta` with the mean `rate`, and its `doubt`. Earlier errors grow by
+    /// the smaller one of two factors:
+    ///
+    /// - exp(∫g), with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law, by the trapezoidal
+    ///   rule, for strains proportional to 1/ζ. Prescribed displacements prevent such strains.
+    /// - ζ'_n / ζ'_{n−1}, at least 1. An error δζ of ζ' = φ(ζ) grows like ζ', and the rise of a load adds to this.
     pub(super) fn add_error(
         &mut self,
         length: f64,
         error: &DVector<f64>,
+        doubt: &DVector<f64>,
         zeta: &DVector<f64>,
         rate: &DVector<f64>,
     ) {
-        let delay = error.zip_map(rate, |e, rate| if rate == 0.0 { 0.0 } else { e / rate });
-        self.memory.delay += delay;
         if let (Some(laws), Some(before)) = (self.problem.damage(), &self.memory.rate) {
             // A node may belong to several materials.
             let growth = |zeta: f64, rate: f64| {
                 let of_laws = laws.iter().map(|law| law.error_growth(zeta, rate.min(0.0)));
                 of_laws.fold(0.0, f64::max)
             };
-            for (i, own) in self.memory.error.iter_mut().enumerate() {
-                if before[i] < 0.0 || rate[i] < 0.0 {
-                    let start = growth(self.memory.zeta[i], before[i]);
-                    *own *= (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
+            for i in (0..zeta.len()).filter(|&i| before[i] < 0.0 || rate[i] < 0.0) {
+                let start = growth(self.memory.zeta[i], before[i]);
+                let mut factor = (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
+                if before[i] < 0.0 {
+                    factor = factor.min((rate[i] / before[i]).max(1.0));
                 }
+                self.memory.error[i] *= factor;
+                self.memory.doubt[i] *= factor;
             }
         }
         self.memory.error += error;
-        self.memory.added += error.abs();
+        self.memory.doubt += doubt.abs();
     }
 
-    /// The error of the steps had it not grown, over the estimated one: at most 1. Collective.
-    pub(crate) fn ungrown(&self) -> f64 {
-        let partition = &self.problem.body.vertices.partition;
-        let [added, error] = [&self.memory.added, &self.memory.error]
-            .map(|field| partition.comm().max(field.rows(0, partition.owned()).amax()));
-        if added < error { added / error } else { 1.0 }
-    }
-
-    /// At the node of minimum `zeta`: the error of ζ̃, the delay, s, and ζ′ in this step (`rate`) and in the one before, 1/s.
-    /// Collective.
-    pub(super) fn at_weakest_node(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> [f64; 4] {
+    /// At the node of minimum `zeta`: its error bar, and ζ′ in this step (`rate`) and in the one before, 1/s. Collective.
+    pub(super) fn at_weakest_node(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> [f64; 3] {
         let partition = &self.problem.body.vertices.partition;
         let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
         let (_, rank) = partition.comm().min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
         let before = self.memory.rate.as_ref().unwrap_or(rate);
-        let values = |i: usize| [self.memory.error[i], self.memory.delay[i], rate[i], before[i]];
-        let values = weakest.map_or([0.0; 4], values);
+        let bar = self.step_bar();
+        let values = weakest.map_or([0.0; 3], |i| [bar[i], rate[i], before[i]]);
         values.map(|value| partition.comm().broadcast(rank, value))
     }
 }
