@@ -45,8 +45,8 @@ pub struct RunArguments {
     /// Print a closing table of phases (time, time per call, bytes moved) and all notes, also minor ones.
     #[arg(long)]
     profile: bool,
-    /// Measure the error of each figure that the mesh causes: two runs with few steps, on the mesh and on
-    /// this mesh bisected everywhere (`signorini check` estimates their time). --accuracy includes it.
+    /// Measure the error of each figure that the mesh causes: three runs with few steps, on the mesh and on
+    /// this mesh bisected everywhere, once and twice (`signorini check` estimates their time). --accuracy includes it.
     #[arg(long)]
     bars: bool,
     /// Continue the same run from its last checkpoint, with the same results bit by bit; without a

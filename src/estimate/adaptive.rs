@@ -1,11 +1,11 @@
 //! Meshes for an accuracy.
 //!
-//! The rounds start from a coarse mesh. In each round, a run with few time steps estimates two errors per triangle:
-//! the error of u, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), and the
-//! interpolation error of the damage in P1. Triangles are bisected until these estimates are small enough.
+//! The rounds start from a coarse mesh. In each round, a run with few time steps estimates the error of u per triangle,
+//! m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there). Triangles are bisected until it is
+//! small enough.
 //!
 //! An estimate misses details finer than the mesh, so a [`Measurement`] ends the rounds: the same steps on the mesh
-//! bisected everywhere. If a figure then changes by more than its share of the accuracy, the rounds go on.
+//! bisected everywhere. If the bar of a figure then exceeds its share of the accuracy, the rounds go on.
 //!
 //! - In: a scene with an accuracy, and a coarse mesh of its body ([`adapted`]); or any mesh ([`measured_errors`]).
 //! - Out: the mesh of the last round with the measured errors of the figures on it ([`Adapted`], [`Measured`]), or
@@ -53,7 +53,7 @@ pub struct Adapted {
     pub rounds: usize,
     /// The estimated relative error of u on it, in the energy norm, at the worst time.
     pub error: f64,
-    /// The relative error of the damage at the end: the measured one, or that of its interpolation before.
+    /// The measured relative error of the damage at the end.
     pub damage_error: Option<f64>,
     /// The damage at the end of the run with few steps, max (ζ₀ − ζ) and its mean; 0 if the run stops at ζ_*.
     pub damage: [f64; 2],
@@ -184,8 +184,8 @@ fn with_passing_loads(
     Ok(scene)
 }
 
-/// The errors of the figures of `scene` from `mesh`, measured by two runs: on the mesh and on the mesh bisected
-/// everywhere. Their steps are few, or chosen for the error `of_steps` of ζ. Collective.
+/// The errors of the figures of `scene` from `mesh`, measured by three runs: on the mesh and on the mesh bisected
+/// everywhere, once and twice. Their steps are few, or chosen for the error `of_steps` of ζ. Collective.
 ///
 /// # Errors
 /// See [`AdaptError`].
@@ -251,7 +251,7 @@ fn refined(
             continue;
         }
         let round = Round::new(&scene, mesh, run, accuracy)?;
-        progress.estimated(triangles, round.resolves_data().then(|| round.estimate()));
+        progress.estimated(triangles, round.resolves_data().then_some(round.error));
         // The measured errors, or the reason why there are none.
         let measure = |progress: &mut Progress, limits: &mut Limits| {
             if let Some(limit) = limits.exceeded(&[4 * triangles]) {

@@ -8,9 +8,6 @@ use crate::{
 };
 use serde::Serialize;
 
-/// The reason why an extreme is not resolved that grows from mesh to mesh.
-const UNSETTLED: &str = "the meshes do not settle it";
-
 /// An extreme of a state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Extreme {
@@ -165,7 +162,9 @@ impl Extremes {
             let is_unsettled = measured.unsettled.contains(part);
             let extreme = &mut extremes.of_points[i];
             match is_unsettled {
-                true if extreme.is_known() => extreme.unresolved = Some(UNSETTLED.to_owned()),
+                true if extreme.is_known() => {
+                    extreme.unresolved = Some("the meshes do not settle it".to_owned())
+                }
                 false if !measured.bars.is_empty() => extreme.singular = None,
                 _ => {}
             }

@@ -1,12 +1,11 @@
 //! Error estimates, and meshes adapted to an accuracy.
 //!
 //! A run solves a discrete problem. This room estimates the difference from the exact solution of the scene, and
-//! refines meshes until the difference is within the required accuracy. There are four estimates:
+//! refines meshes until the difference is within the required accuracy. There are three estimates:
 //!
 //! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
 //!   (the same strains give the [`NodalStress`] of pictures);
-//! - the interpolation error of the damage, per triangle, from recovered gradients of ζ;
-//! - [`Measured`]: the error bar of each printed figure, measured by a second run on a finer mesh;
+//! - [`Measured`]: the error bar of each printed figure, measured by the same run on three meshes;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
@@ -21,9 +20,7 @@ mod patches;
 mod recovery;
 mod stress;
 mod extremes;
-mod damage_interpolation;
 mod error_budget;
-mod penetration;
 mod adaptive;
 
 pub use adaptive::{AdaptError, Adapted, INSTANTS, Measured, adapted, measured_errors};

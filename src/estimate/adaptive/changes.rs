@@ -3,29 +3,31 @@
 use super::{few_step_run::FewStepRun, finer::Finer, sizes::areas};
 use crate::mesh::Mesh;
 
-/// The final change ‖ζ_h − ζ_{h/2}‖ / ‖1 − ζ_{h/2}‖, and max |ζ_h − ζ_{h/2}| per triangle. Collective.
+/// Per triangle: its share in the squared change ‖ζ_h − ζ_{h/2}‖² / ‖1 − ζ_{h/2}‖² at the end, and max |ζ_h − ζ_{h/2}|.
+/// Collective.
 pub(super) fn damage(
     mesh: &Mesh,
     finer: &Finer,
     coarse: &FewStepRun,
     fine: &FewStepRun,
-) -> (f64, Vec<f64>) {
+) -> [Vec<f64>; 2] {
     let before = finer.interpolated(at_vertices(mesh, &coarse.zeta()));
-    let mut changes = vec![0.0_f64; mesh.triangles.len()];
+    let mut largest = vec![0.0_f64; mesh.triangles.len()];
+    let mut shares = largest.clone();
     let mesh = &finer.mesh;
     let now = at_vertices(mesh, &fine.zeta());
-    let mut sums = [0.0; 2];
+    let mut done = 0.0;
     let parts = mesh.triangles.iter().zip(&finer.parents).zip(areas(mesh));
     for ((nodes, &parent), area) in parts {
         for &node in nodes {
             let change = now[node] - before[node];
-            sums[0] += area * change * change;
-            sums[1] += area * (1.0 - now[node]).powi(2);
-            changes[parent] = changes[parent].max(change.abs());
+            shares[parent] += area * change * change;
+            done += area * (1.0 - now[node]).powi(2);
+            largest[parent] = largest[parent].max(change.abs());
         }
     }
-    let relative = if sums[0] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 };
-    (relative, changes)
+    shares.iter_mut().for_each(|share| *share = if *share > 0.0 { *share / done } else { 0.0 });
+    [shares, largest]
 }
 
 /// A field at the vertices of `mesh`, from its values on the triangles.

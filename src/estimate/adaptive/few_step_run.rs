@@ -1,10 +1,7 @@
 //! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
-    estimate::{
-        Extremes, NodalStress, RecoveredStrains, UNLOADED,
-        damage_interpolation::interpolation_shares, strained,
-    },
+    estimate::{Extremes, NodalStress, RecoveredStrains, UNLOADED, strained},
     evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State},
@@ -138,14 +135,6 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn open(&self) -> f64 {
         let (open, length) = (self.open_length(), self.extremes().of_points.len());
         if open > 0.0 { open / self.history.sizes_of_extremes[length] } else { 0.0 }
-    }
-
-    /// The shares of the triangles in the squared interpolation error of the damage at the end, zeros if ζ_* was reached.
-    /// Collective.
-    pub(super) fn damage_shares(&self) -> Result<Vec<f64>, PetscError> {
-        let shares = interpolation_shares(self.problem, &self.outcome.last.state)?;
-        let stops = self.stop().is_some();
-        Ok(self.gathered(&if stops { vec![0.0; shares.len()] } else { shares }))
     }
 
     /// ζ at the end at the vertices of each triangle of the undivided mesh. Collective.

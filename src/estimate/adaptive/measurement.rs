@@ -45,6 +45,8 @@ impl MeasuredError {
 pub(super) enum Cause {
     /// The triangles at the ends of contact.
     Ends,
+    /// The error of ζ everywhere: the shares of the triangles in its square.
+    Damage(Vec<f64>),
     /// Triangles in which ζ changes: the maximum change in each triangle.
     Change(Vec<f64>),
     /// The triangles at the ends of contact and at singular points.
@@ -77,7 +79,8 @@ pub(super) struct Measurement {
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// Per triangle: max |Δζ|; empty without damage.
+    /// Per triangle: its share of the squared error of ζ, and max |Δζ|; empty without damage.
+    of_damage: Vec<f64>,
     zeta: Vec<f64>,
     /// The names of the extremes.
     extremes: Vec<String>,
@@ -164,9 +167,11 @@ impl Measurement {
             return measured;
         }
         if problem.damage().is_some() {
-            let (change, of_triangles) = damage(mesh, finer, coarse, fine);
-            (measured.damage, measured.zeta) =
-                (sequence.error_over_change() * change, of_triangles);
+            let [shares, largest] = damage(mesh, finer, coarse, fine);
+            let square = sequence.error_over_change().powi(2);
+            measured.of_damage = shares.iter().map(|share| square * share).collect();
+            measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
+            measured.zeta = largest;
         }
         measured
     }
@@ -253,7 +258,8 @@ impl Measurement {
     /// The cause of the error of the figure `name`.
     pub(super) fn cause(&self, name: &str) -> Cause {
         let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
-            return Cause::Fields(1.0);
+            let of_damage = || Cause::Damage(self.of_damage.clone());
+            return if name == "damage" { of_damage() } else { Cause::Fields(1.0) };
         };
         let is_here = |(place, _): &&(String, _)| {
             name.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))

@@ -36,10 +36,9 @@ pub(super) struct Round<'a> {
     mesh: &'a Mesh,
     pub(super) run: FewStepRun<'a>,
     accuracy: f64,
-    /// The estimated relative error of u at the worst time and its shares; the shares of the damage's error.
-    error: f64,
+    /// The estimated relative error of u at the worst time and its shares.
+    pub(super) error: f64,
     shares: Vec<f64>,
-    of_damage: Vec<f64>,
     /// Edges on which a function of the scene is not resolved.
     unresolved: HashSet<[usize; 2]>,
     /// The allowed penetration between the nodes, m.
@@ -65,13 +64,11 @@ impl<'a> Round<'a> {
         });
         let singular = singular.collect();
         let displacement = run.displacement();
-        let of_damage = run.damage_shares()?;
         Ok(Self {
             unresolved: unresolved(scene, mesh, accuracy, displacement),
             deepest: accuracy * displacement,
             open: run.open() / accuracy,
             singular,
-            of_damage,
             scene,
             mesh,
             run,
@@ -86,23 +83,13 @@ impl<'a> Round<'a> {
         // The errors of figures are products of two estimated errors, see [`Cause::FIGURE`].
         let named = !self.scene.accuracy_of.is_empty();
         let wanted = if named { self.accuracy.sqrt() } else { self.accuracy };
-        self.estimate() <= ENOUGH * wanted && (named || self.open <= ENOUGH) && self.resolves_data()
+        self.error <= ENOUGH * wanted && (named || self.open <= ENOUGH) && self.resolves_data()
     }
 
     /// Does the mesh resolve the data of the scene? Another mesh may miss a whole peak of a foundation.
     pub(super) fn resolves_data(&self) -> bool {
         let is_allowed = |&depth: &f64| depth <= self.deepest;
         self.unresolved.is_empty() && self.run.depths().iter().all(is_allowed)
-    }
-
-    /// The interpolation error of the damage at the end, relative, in L².
-    fn damage_error(&self) -> f64 {
-        self.of_damage.iter().sum::<f64>().sqrt()
-    }
-
-    /// The larger one of the estimated errors.
-    pub(super) fn estimate(&self) -> f64 {
-        self.error.max(self.damage_error())
     }
 
     /// The mesh with its errors.
@@ -122,11 +109,7 @@ impl<'a> Round<'a> {
             unknowns: 2 * self.run.problem.body.nodes.partition.total(),
             rounds,
             error: self.error,
-            damage_error: self
-                .run
-                .problem
-                .damage()
-                .map(|_| measured.map_or(self.damage_error(), |of| of.damage)),
+            damage_error: self.run.problem.damage().and(measured).map(|of| of.damage),
             damage: self.run.damage(),
             steps: match measured {
                 Some(measured) if self.run.stop().is_none() => {
@@ -199,6 +182,9 @@ impl<'a> Round<'a> {
                     let size = |change| if change > HALF * largest { goal.min(HALF) } else { 1.0 };
                     take_smaller(&mut ratios, zeta.into_iter().map(size).collect());
                 }
+                Cause::Damage(shares) => {
+                    take_smaller(&mut ratios, size_ratios(&shares, 2, AIM * self.accuracy));
+                }
                 Cause::Around(point, derivative) => {
                     let shares = influences(self.mesh, &shares, order, point, derivative);
                     let all: f64 = shares.iter().sum();
@@ -209,8 +195,6 @@ impl<'a> Round<'a> {
         }
         let of_u = if smaller < 1.0 { smaller * self.error } else { self.accuracy };
         take_smaller(&mut ratios, size_ratios(&shares, order, AIM * of_u.min(self.accuracy)));
-        let of_damage = AIM * AIM * smaller * self.accuracy;
-        take_smaller(&mut ratios, size_ratios(&self.of_damage, 2, of_damage));
         for ((ratio, &[a, b, c]), depth) in ratios.iter_mut().zip(&self.mesh.triangles).zip(depths)
         {
             let mut sides = [[a, b], [b, c], [c, a]].into_iter();

@@ -4,11 +4,10 @@
 //!
 //! if the gap is narrower or more curved than an edge can resolve.
 
+use super::{DiscreteProblem, NOTED, State, rows_of};
 use crate::{
-    evolution::percent,
     fem::{Edge, Elements, parabola},
     mesh::sorted,
-    problem::{DiscreteProblem, NOTED, State, rows_of},
     scene::Gap,
 };
 use std::collections::HashMap;
@@ -20,11 +19,11 @@ const NARROWEST: f64 = 1e-5;
 
 /// The penetration of the foundation between the nodes of an edge.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Penetration {
+pub(crate) struct Penetration {
     /// The triangle of the edge, in the undivided mesh.
-    pub(super) triangle: usize,
+    pub(crate) triangle: usize,
     /// The maximum p(s) of the edge, m.
-    pub(super) depth: f64,
+    pub(crate) depth: f64,
     /// Where it is, m.
     at: [f64; 2],
     /// The number of the boundary in the scene.
@@ -33,7 +32,7 @@ pub(super) struct Penetration {
 
 impl DiscreteProblem {
     /// The penetrations of the foundation between the nodes of Γ_C, in a state. Collective.
-    pub(super) fn penetrations(&self, state: &State) -> Vec<Penetration> {
+    pub(crate) fn penetrations(&self, state: &State) -> Vec<Penetration> {
         let mut own = Vec::new();
         let displacement = self.body.nodes.partition.max_norm(&state.u);
         let boundaries = self.scene().boundaries.iter().enumerate();
@@ -133,7 +132,7 @@ impl DiscreteProblem {
 
     /// A note on contact between the nodes in some states of a run: if there is much, or if no node of the foundation
     /// touches. Collective.
-    pub(super) fn penetration_note(&self, states: &[&State]) -> Option<String> {
+    pub(crate) fn penetration_note(&self, states: &[&State]) -> Option<String> {
         if !self.has_contact() {
             return None;
         }
@@ -151,11 +150,11 @@ impl DiscreteProblem {
         let Penetration { depth, at, boundary, .. } = deepest;
         (excess > displacement).then(|| {
             format!(
-                "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at {}, {} of the largest \
+                "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at {}, {:.2} % of the largest \
                  displacement: displacements and forces may be far off; refine the mesh there, or set accuracy",
                 self.scene().boundaries[boundary].name,
                 self.mesh().place(at),
-                percent(depth / displacement)
+                100.0 * depth / displacement
             )
         })
     }
