@@ -199,7 +199,9 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     let is_last = task.repeats || shorter_steps(task, outcome).is_none();
     let limit = "a repetition with shorter steps would take longer than --max-seconds".to_owned();
     let limit = (!is_last).then_some(limit);
-    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed).chain(limit);
+    let missing = missing_bars(task, outcome);
+    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed);
+    let reasons = reasons.chain(limit).chain(missing);
     let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
     let quantities = task.problem.quantities();

@@ -231,7 +231,9 @@ fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
     let of_accuracy = [
         accuracy::accuracy_note(task, outcome).map(|(_, note)| note),
         accuracy::kink_note(task),
-        outcome.and_then(|outcome| accuracy::missing_bars(task, outcome)),
+        outcome
+            .filter(|_| task.adapted.is_none())
+            .and_then(|run| accuracy::missing_bars(task, run)),
     ];
     let of_task = task.notes.iter().cloned().chain(task.problem.notes());
     let of_run = outcome.into_iter().flat_map(|outcome| outcome.notes(&task.problem));
