@@ -11,8 +11,9 @@ A scene of handbook/ has its truth in comments, one line for each figure of summ
 
 Every scene runs with uniform triangles of the first and the second order and `--bars`, and with `--accuracy`. A bar holds
 if it covers the error and the truth's own error. "Reached" is true if no error exceeds the accuracy times the largest value
-of its kind in the run, except those of extremes that are printed as singular or not resolved. "P1 polygon" is P1 with curved sides, whose error of shape no bar contains. The held-out half of the
-scenes has names with an odd hash: change the program by the other half.
+of its kind in the run, except those of extremes that are printed as singular or not resolved. "P1 polygon" is P1 with curved
+sides, whose error of shape no bar contains. The held-out half of the scenes has names with an odd hash: change the program by
+the other half.
 Writes OUT/handbook.csv, a row for each figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
 

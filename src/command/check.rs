@@ -203,8 +203,8 @@ fn cost(problem: &DiscreteProblem) -> String {
     let step = 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);
     let once = 0.05 + 50e-6 * nodes;
     let megabytes = 50.0 + 8e-3 * nodes;
-    // As many steps on the mesh as on a mesh with four times as many triangles.
-    let bars = INSTANTS as f64 * (step + 4.0 * 1.45 * step) + 2.5 * once;
+    // As many steps on the mesh as on meshes with 4 and 16 times as many triangles.
+    let bars = INSTANTS as f64 * (1.0 + 4.0 * 1.45 + 16.0 * 2.1) * step + 10.0 * once;
     let seconds = match scene.time.map(|grid| grid.stepping) {
         _ if scene.accuracy.is_some() => {
             return "the run chooses mesh and steps for the required accuracy".to_owned();

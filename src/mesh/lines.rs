@@ -91,6 +91,11 @@ impl<'a> Lines<'a> {
         [tangent.re, tangent.im]
     }
 
+    /// The possible error, rad, of the tangent of the line ab at a.
+    pub fn tangent_error(&self, a: usize, b: usize) -> f64 {
+        self.estimate(a, b).1
+    }
+
     /// The unit tangent at a by the points after a on the line ab, and its possible error, rad.
     fn estimate(&self, a: usize, b: usize) -> (Complex<f64>, f64) {
         match self.points(a, b)[..] {

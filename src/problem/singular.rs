@@ -168,7 +168,12 @@ impl DiscreteProblem {
         supports: &BTreeMap<[usize; 2], Support>,
         [node, first]: [usize; 2],
     ) -> Option<Singular> {
-        let (sectors, last) = wedges.around(node, first);
+        let (mut sectors, last) = wedges.around(node, first);
+        // The tangents of other curves than circles are not exact: a corner is not re-entrant within their errors.
+        if let [(_, angle)] = &mut sectors[..] {
+            *angle -=
+                [first, last].map(|end| wedges.lines.tangent_error(node, end)).iter().sum::<f64>();
+        }
         let sides = [[node, first], [last, node]].map(|edge| supports.get(&edge));
         let [(a, of_a), (b, of_b)] = [(sides[0], first), (sides[1], last)]
             .map(|(side, end)| conditions(side, wedges.tangent(node, end)));

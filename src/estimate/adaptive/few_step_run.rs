@@ -33,19 +33,16 @@ struct History {
     /// max_t ‖ε* − ε(u)‖²_T, and the maximum sum over T at any time.
     squares: Vec<f64>,
     worst: f64,
-    /// max_t ‖u‖², the maximum Σ|·| of forces, N per metre of thickness, and the maximum |u| at any time, m.
+    /// max_t ‖u‖², N m per metre of thickness, and the maximum |u| at any time, m.
     energy: f64,
-    forces: f64,
     displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
     /// The maximum penetration at an edge of each triangle at any time, m.
     depths: Vec<f64>,
-    /// The times at which steps end, s, and the figures of the last one, except the extremes.
+    /// The times at which steps end, s.
     times: Vec<f64>,
-    figures: Vec<f64>,
-    /// The maximum size of each figure, and of each extreme at the times at which errors are estimated.
-    sizes: Vec<f64>,
+    /// The maximum size of each extreme at the times at which errors are estimated.
     sizes_of_extremes: Vec<f64>,
 }
 
@@ -100,14 +97,14 @@ impl<'a> FewStepRun<'a> {
 
     /// The scales of the figures. An extreme that `grows` is no scale of the others.
     pub(super) fn scales(&self, grows: &[String]) -> Vec<f64> {
-        let History { sizes, sizes_of_extremes, energy, forces, .. } = &self.history;
+        let History { sizes_of_extremes, energy, .. } = &self.history;
         let names = self.problem.extremes();
         let of_extremes = names
             .iter()
             .zip(sizes_of_extremes)
             .map(|(name, &size)| if grows.iter().any(|grown| grown == name) { 0.0 } else { size });
-        let sizes = Vec::from_iter(sizes.iter().copied().chain(of_extremes));
-        self.problem.figure_scales(&sizes, *energy, *forces)
+        let sizes = Vec::from_iter(self.outcome.sizes.iter().copied().chain(of_extremes));
+        self.problem.figure_scales(&sizes, *energy, self.outcome.last.forces)
     }
 
     /// The times at which steps end, s.
@@ -117,7 +114,7 @@ impl<'a> FewStepRun<'a> {
 
     /// All figures at the end, the extremes last.
     pub(super) fn values(&self) -> Vec<f64> {
-        [self.history.figures.clone(), self.extremes().values()].concat()
+        [self.outcome.last.figures(), self.extremes().values()].concat()
     }
 
     /// The extremes at the end.
@@ -173,13 +170,10 @@ impl History {
             squares: vec![0.0; triangles],
             worst: 0.0,
             energy: 0.0,
-            forces: 0.0,
             displacement: 0.0,
             end: Default::default(),
             depths: vec![0.0; triangles],
             times: Vec::new(),
-            figures: Vec::new(),
-            sizes: Vec::new(),
             sizes_of_extremes: Vec::new(),
         }
     }
@@ -187,11 +181,7 @@ impl History {
     /// Records an accepted step. Collective.
     fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
         let time = step.state.time;
-        let figures = step.figures();
-        self.forces = step.forces;
-        enlarge(&mut self.sizes, problem.figure_sizes(&figures));
         self.times.push(time);
-        self.figures = figures;
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
         let part = |time: f64| (self.instants as f64 * time / end + 1e-9).floor();
         let is_larger = step.record.displacement_max > LARGER * self.displacement;
@@ -216,7 +206,10 @@ impl History {
         let recovered = RecoveredStrains::on(&self.stress.patches, body, strained.strains)?;
         let stresses = self.stress.by_fits(&recovered.fits, &strained.zeta);
         let extremes = Extremes::new(problem, state, &self.stress, &stresses);
-        enlarge(&mut self.sizes_of_extremes, extremes.values());
+        let values = extremes.values();
+        self.sizes_of_extremes.resize(values.len(), 0.0);
+        let sizes = self.sizes_of_extremes.iter_mut().zip(values);
+        sizes.for_each(|(most, value)| *most = most.max(value.abs()));
         self.extremes = extremes;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());
@@ -226,12 +219,6 @@ impl History {
         self.energy = self.energy.max(error.energy);
         Ok(())
     }
-}
-
-/// The larger ones of two lists of sizes, of which the first may be empty.
-fn enlarge(largest: &mut Vec<f64>, values: Vec<f64>) {
-    largest.resize(values.len(), 0.0);
-    largest.iter_mut().zip(values).for_each(|(most, value)| *most = most.max(value.abs()));
 }
 
 /// Values of this rank's triangles for all `count` triangles of the undivided mesh. Collective.
