@@ -129,9 +129,9 @@ impl AdaptError {
 
 /// The tolerance of the time steps of the runs with few steps.
 const FEW_STEP_TOLERANCE: f64 = 0.05;
-/// Maximum number of rounds, and of triangles of a mesh or its measurement.
+/// Maximum number of rounds.
 const MAX_ROUNDS: usize = 25;
-const MAX_TRIANGLES: usize = 4_000_000;
+
 /// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: the errors of the figures,
 /// of u (energy norm) and of the damage. If the run ends at ζ_*, only the errors of u and of this time count. The
 /// caller controls the errors of the time steps. `seen` is called with each mesh and its errors. If a run on a

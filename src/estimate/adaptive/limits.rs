@@ -6,7 +6,6 @@
 //!
 //! Factors grow faster. So the rounds leave half of the free memory and of the time alone.
 
-use super::MAX_TRIANGLES;
 use crate::{memory, petsc::Communicator, scene::Scene};
 use std::time::Instant;
 
@@ -56,10 +55,8 @@ impl Limits {
         let needed = triangles.iter().map(|count| cost(count, 0)).fold(0.0, f64::max);
         let passed = self.comm.max(self.started.elapsed().as_secs_f64());
         let longer = passed + triangles.iter().map(|count| cost(count, 1)).sum::<f64>();
-        let most = triangles.iter().copied().max().unwrap_or(0);
         let megabytes = [needed, bytes].map(|bytes| 1e-6 * bytes);
         match () {
-            () if most > MAX_TRIANGLES => Some("the limit on triangles is reached".to_owned()),
             () if needed > bytes => Some(format!(
                 "finer meshes would take {:.0} MB of memory, and {:.0} MB are allowed (--max-memory)",
                 megabytes[0], megabytes[1]

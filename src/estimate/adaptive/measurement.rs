@@ -22,7 +22,8 @@ use crate::{
 /// makes about twice as many triangles; with twice, accuracies are missed.
 const SHARE: f64 = 0.97;
 
-/// A third mesh of at most so many triangles is always worth its run. On eight scenes, with half of it and with twice …
+/// A third mesh of at most so many triangles is always worth its run. It protects the seconds of `lshape`, whose first mesh
+/// has 2356 triangles: with a third mesh it took 4.5 s for 0.9.
 const CHEAP: usize = 16_000;
 
 /// A measured error.
