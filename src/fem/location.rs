@@ -25,22 +25,41 @@ pub struct PointValues {
 
 /// A point between a chord and its arc may lie outside the triangle by this fraction of its height.
 const OUTSIDE: f64 = 0.05;
+/// A triangle is a candidate if the point lies outside its chords by at most this fraction of its height.
+const NEAR: f64 = 0.5;
+/// λ above the negative of this is rounding.
+const TIES: f64 = 1e-9;
 /// The number of Newton steps for λ in a curved triangle.
 const CORRECTIONS: usize = 8;
 
 impl Location {
-    /// The location of `point`, m, in the undivided `body`; `None` if it lies outside.
-    pub fn of(point: [f64; 2], body: &Body) -> Option<Self> {
-        let least = |l: &[f64; 3]| l.iter().copied().fold(f64::INFINITY, f64::min);
-        let candidates = (0..body.triangles.len()).map(|triangle| {
+    /// The locations of `point`, m, in the undivided `body`: in all triangles of one material that contain it, as at a vertex.
+    /// Empty if it lies outside.
+    pub fn of(point: [f64; 2], body: &Body) -> Vec<Self> {
+        let depth = |of: &Self| of.barycentric.iter().copied().fold(f64::INFINITY, f64::min);
+        let locations = (0..body.triangles.len()).map(|triangle| {
             let vertex = body.mesh.nodes[body.mesh.triangles[triangle][0]];
             let barycentric = barycentric(body, triangle, point, [1.0, 0.0, 0.0], vertex);
             Self { triangle, barycentric }
         });
-        let best = candidates
-            .max_by(|a, b| least(&a.barycentric).total_cmp(&least(&b.barycentric)))?
-            .corrected(point, body);
-        (least(&best.barycentric) >= -OUTSIDE).then_some(best)
+        // The point may lie between a chord and its arc.
+        let near = locations.filter(|of| depth(of) > -NEAR).map(|of| of.corrected(point, body));
+        let mut near: Vec<Self> = near.collect();
+        near.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
+        let Some(best) = near.first().copied().filter(|of| depth(of) >= -OUTSIDE) else {
+            return Vec::new();
+        };
+        let material = |of: &Self| body.material(of.triangle);
+        near.retain(|of| {
+            depth(of) >= depth(&best).min(0.0) - TIES && material(of) == material(&best)
+        });
+        near
+    }
+
+    /// The vertex with the largest λ, by its number in the undivided mesh.
+    pub fn nearest(&self, body: &Body) -> usize {
+        let largest = (0..3).max_by(|&i, &j| self.barycentric[i].total_cmp(&self.barycentric[j]));
+        body.mesh.triangles[self.triangle][largest.unwrap_or(0)]
     }
 
     /// Newton's method for x(λ) = `point` with the Jacobian of the straight triangle.

@@ -2,7 +2,7 @@
 
 use super::{DiscreteProblem, notes::TIMES};
 use serde::{Deserialize, Serialize};
-use std::iter;
+use std::{collections::BTreeMap, iter};
 
 /// The figures of a [`StepRecord`](crate::evolution::StepRecord) that have an error bar.
 const OF_RECORD: [&str; 5] = ["work", "displacement_max", "contact_force", "zeta_min", "zeta_mean"];
@@ -20,6 +20,12 @@ const MIN_SCALE: f64 = 1e-3;
 /// small about any point near the line of its force. The scale of a stress is at least this fraction of the mean stress
 /// of the body, about √(E ‖u‖²/|Ω|): a stress at a free corner is zero.
 const MIN_PART: f64 = 0.1;
+/// The components of a displacement and of a stress at a probe.
+const OF_PROBE: [&str; 6] =
+    [".u_x", ".u_y", ".stress_xx", ".stress_yy", ".stress_xy", ".von_mises"];
+/// The least error of a component over the largest. On 40 bodies with 1900 stresses at probes, 7.4 % of their bars fail without
+/// it, and 1.5 % with a fifth, 1.1 % with 0.3.
+const OF_COMPONENTS: f64 = 0.25;
 /// A damage below this is negligible.
 pub(crate) const NEGLIGIBLE_DAMAGE: f64 = 1e-6;
 
@@ -117,15 +123,30 @@ impl DiscreteProblem {
         stresses.chain(of_contact.flat_map(|name| foundations(name))).collect()
     }
 
+    pub(crate) fn dimensions(&self) -> Vec<Dimension> {
+        self.figures().into_iter().map(|figure| figure.dimension).collect()
+    }
+
     pub(crate) fn figure_names(&self) -> Vec<String> {
         self.figures().into_iter().map(|figure| figure.name).collect()
     }
 
-    /// The error bars of all figures, from their errors and scales.
+    /// The error bars of all figures, from their errors and scales. An error may be small by chance, but hardly those of all
+    /// components at a probe: it is at least [`OF_COMPONENTS`] of the largest of them.
     pub(crate) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {
-        let bar =
-            |(Figure { name, dimension, .. }, (&bar, &scale))| Bar { name, dimension, bar, scale };
-        self.figures().into_iter().zip(errors.iter().zip(scales)).map(bar).collect()
+        let figures = self.figures();
+        let is_component = |of: &Figure| OF_PROBE.iter().any(|kind| of.name.ends_with(kind));
+        let mut largest = BTreeMap::<&str, f64>::new();
+        for (of, error) in figures.iter().zip(errors).filter(|(of, _)| is_component(of)) {
+            let most = largest.entry(&of.group).or_default();
+            *most = most.max(*error);
+        }
+        let bar = |(of, (&error, &scale)): (&Figure, (&f64, &f64))| {
+            let least = largest.get(&*of.group).filter(|_| is_component(of));
+            let bar = error.max(least.map_or(0.0, |most| OF_COMPONENTS * most));
+            Bar { name: of.name.clone(), dimension: of.dimension, bar, scale }
+        };
+        figures.iter().zip(errors.iter().zip(scales)).map(bar).collect()
     }
 
     /// The scale of each figure: the maximum of its group in a run, and at least a part of its natural scale. From the

@@ -151,7 +151,7 @@ impl DiscreteProblem {
             certificate: self.certificate.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),
             supports: self.supports.restrict(&subdomain),
-            probes: self.probes.restrict(&subdomain),
+            probes: self.probes.restrict(&self.body, &subdomain),
             body: subdomain.body(&self.body),
             undivided: Some((self.body.mesh, owners)),
             ..self

@@ -5,10 +5,11 @@ use crate::{
     fem::{Body, Location, Subdomain},
     scene::Scene,
 };
+use nalgebra::Vector3;
 
-/// The places of the probes, each with its triangle on this rank; `None` if another rank owns it.
+/// The places of the probes, each with its triangles on this rank; `None` if it belongs to another rank.
 #[derive(Debug)]
-pub(super) struct Probes(Vec<(Location, Option<usize>)>);
+pub(super) struct Probes(Vec<(Vec<Location>, Option<Vec<usize>>)>);
 
 /// The quantities at each probe: displacement, m; damage; stress, Pa.
 pub(crate) const OBSERVED: [&str; 7] =
@@ -22,28 +23,42 @@ impl Probes {
     pub(super) fn new(scene: &Scene, body: &Body) -> Result<Self, SetupError> {
         let (mut places, mut outside) = (Vec::new(), Vec::new());
         for probe in &scene.probes {
-            match Location::of(probe.point, body) {
-                Some(location) => places.push((location, Some(location.triangle))),
-                None => outside.push(probe),
+            let locations = Location::of(probe.point, body);
+            match locations.is_empty() {
+                true => outside.push(probe),
+                false => {
+                    let triangles = locations.iter().map(|location| location.triangle).collect();
+                    places.push((locations, Some(triangles)));
+                }
             }
         }
         scene.check_probes(&outside)?;
         Ok(Self(places))
     }
 
-    /// The probes in the triangles that a rank owns.
-    pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
-        let local = |&(place, _): &(Location, _)| (place, subdomain.own_triangle(place.triangle));
+    /// The probes whose nearest vertex in the undivided `body` a rank owns. It keeps all triangles around this vertex.
+    pub(super) fn restrict(&self, body: &Body, subdomain: &Subdomain) -> Self {
+        let local = |(locations, _): &(Vec<Location>, Option<Vec<usize>>)| {
+            let is_own = subdomain.owned(locations[0].nearest(body)).is_some();
+            let triangles = locations.iter().map(|of| subdomain.triangle(of.triangle));
+            (locations.clone(), if is_own { triangles.collect() } else { None })
+        };
         Self(self.0.iter().map(local).collect())
     }
 
-    /// The quantities at all probes; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point.
+    /// The quantities at all probes; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point, with the mean
+    /// strain of its triangles.
     pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
-        let values = |(location, triangle): &(Location, Option<usize>)| {
-            let Some(t) = *triangle else { return [0.0; OBSERVED.len()] };
-            let at = location.values(&problem.body, t, &state.u, &state.zeta);
-            let (elasticity, body) = (&problem.elasticity, &problem.body);
-            let stress = elasticity.d(body, t) * at.strain * problem.truncated(at.zeta);
+        let (elasticity, body) = (&problem.elasticity, &problem.body);
+        let values = |(locations, triangles): &(Vec<Location>, Option<Vec<usize>>)| {
+            let Some(triangles) = triangles else { return [0.0; OBSERVED.len()] };
+            let values = locations.iter().zip(triangles);
+            let values = values.map(|(of, &t)| of.values(body, t, &state.u, &state.zeta));
+            let values = Vec::from_iter(values);
+            let strain =
+                values.iter().map(|at| at.strain).sum::<Vector3<f64>>() / values.len() as f64;
+            let (at, t) = (values[0], triangles[0]);
+            let stress = elasticity.d(body, t) * strain * problem.truncated(at.zeta);
             let von_mises = elasticity.material(body, t).von_mises(&stress);
             [at.u[0], at.u[1], at.zeta, stress[0], stress[1], stress[2], von_mises]
         };

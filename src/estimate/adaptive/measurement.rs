@@ -190,20 +190,18 @@ impl Measurement {
         // A material may have the name of a probe.
         self.places = of_extremes.chain(probes).collect();
         self.extremes = problem.extremes();
-        let count = problem.figure_names().len();
-        let first = count - self.extremes.len();
+        let first = problem.figure_names().len() - self.extremes.len();
         // The extreme of the whole settles if that of its part does.
         let part = |i: usize| fine.extremes().part_of(i);
         let settles = |&i: &usize| sequence.settles(first + part(i), &named[part(i)]);
         let unsettled = (0..named.len()).filter(|i| !settles(i));
         self.unsettled = unsettled.map(|i| named[i].name.clone()).collect();
-        let errors = Vec::from_iter((0..count).map(|i| sequence.error(i)));
+        let error = |(i, dimension)| match dimension {
+            Dimension::ContactLength => sequence.error_of_length(i),
+            dimension => sequence.error(i, dimension),
+        };
+        let errors = Vec::from_iter(problem.dimensions().into_iter().enumerate().map(error));
         self.bars = problem.bars(&errors, &fine.scales(&self.unsettled));
-        for (i, bar) in self.bars.iter_mut().enumerate() {
-            if bar.dimension == Dimension::ContactLength {
-                bar.bar = sequence.error_of_length(i);
-            }
-        }
         self.bars.retain(|bar| !self.unsettled.contains(&bar.name));
         coarse.extremes().join(&mut self.bars);
     }
