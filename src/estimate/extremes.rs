@@ -6,6 +6,7 @@ use crate::{
     petsc::{Communicator, PetscError},
     problem::{Bar, ContactRow, DiscreteProblem, Singular, State, peak, rows_of, whole_and_parts},
 };
+use rustc_hash::FxHashSet as HashSet;
 use serde::Serialize;
 
 /// An extreme of a state.
@@ -108,7 +109,27 @@ impl Extremes {
         }
         let near = extremes.near(&unresolved, 1.001);
         extremes.of_points.iter_mut().zip(near).for_each(|(of, name)| of.unresolved = name);
+        extremes.find_jumps(problem, nodal);
         extremes
+    }
+
+    /// Marks the extreme stresses in triangles near a jump of a load as not resolved: fitted strains overshoot there by the same
+    /// part on all meshes. Collective.
+    fn find_jumps(&mut self, problem: &DiscreteProblem, nodal: &NodalStress) {
+        let near = &problem.body.near_jumps;
+        if near.is_empty() {
+            return;
+        }
+        let triangles = problem.body.mesh.triangles.iter();
+        let next = triangles.filter(|triangle| triangle.iter().any(|&vertex| near[vertex]));
+        let next: HashSet<usize> = next.flatten().copied().collect();
+        let points = nodal.points.iter().filter(|of| of.ends.iter().any(|end| next.contains(end)));
+        let places = Vec::from_iter(points.map(|point| point.at));
+        for of in self.of_points.iter_mut().filter(|of| !of.name.ends_with("pressure_max")) {
+            if self.comm.max(f64::from(u8::from(places.contains(&of.at)))) > 0.0 {
+                of.unresolved = Some("a jump of a load".to_owned());
+            }
+        }
     }
 
     /// The parts of the whole whose extreme is `i`: their extremes; none if it is the extreme of a part, or of one material

@@ -29,7 +29,7 @@ pub(super) struct Point {
     pub(super) material: usize,
     pub(super) at: [f64; 2],
     /// The vertices whose fits give its strain: itself, or the ends of its side.
-    ends: [usize; 2],
+    pub(super) ends: [usize; 2],
 }
 
 /// What the stresses of a state are made from.

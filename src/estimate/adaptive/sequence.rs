@@ -130,6 +130,9 @@ impl<'a> Sequence<'a> {
     /// singular point only meshes bisected everywhere contradict theory. Elsewhere an extreme settles until meshes of
     /// different sizes show that it grows.
     pub(super) fn settles(&self, i: usize, extreme: &Extreme) -> bool {
+        if extreme.unresolved.is_some() {
+            return false;
+        }
         let sizes = self.levels.iter().map(|level| size_at(&level.mesh, extreme.at));
         let (sizes, finest) = (Vec::from_iter(sizes), self.levels.len() - 1);
         let change = |from: usize, to: usize| {
