@@ -134,6 +134,83 @@ fn a_stress_that_is_zero_needs_no_finer_mesh_and_a_singular_one_is_told() {
     assert!(said.out.contains(told), "{}", said.out);
 }
 
+/// On a mesh of chords these points lie outside the fibre, and on a finer one outside the plate. Materials of equal stiffness have
+/// the stress 1 everywhere.
+#[test]
+fn probes_inside_a_curved_interface_are_found_on_every_mesh() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "plate.geo",
+        "Point(1) = {-2, -2, 0, 0.8}; Point(2) = {2, -2, 0, 0.8}; Point(3) = {2, 2, 0, 0.8}; Point(4) = {-2, 2, 0, 0.8};
+         Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
+         Point(5) = {0, 0, 0, 0.8}; Point(6) = {1, 0, 0, 0.8}; Point(7) = {0, 1, 0, 0.8}; Point(8) = {-1, 0, 0, 0.8};
+         Point(9) = {0, -1, 0, 0.8};
+         Circle(5) = {6, 5, 7}; Circle(6) = {7, 5, 8}; Circle(7) = {8, 5, 9}; Circle(8) = {9, 5, 6};
+         Curve Loop(1) = {1, 2, 3, 4}; Curve Loop(2) = {5, 6, 7, 8};
+         Plane Surface(1) = {1, 2}; Plane Surface(2) = {2};
+         Physical Curve('left') = {4}; Physical Curve('bottom') = {1}; Physical Curve('right') = {2};
+         Physical Surface('plate') = {1}; Physical Surface('fibre') = {2};\n",
+    );
+    let place = |i: usize| (0.17 * i as f64).sin_cos();
+    let probe = |i| {
+        format!("{{ name = 'p{i}', point = [{}, {}] }}", 0.985 * place(i).1, 0.985 * place(i).0)
+    };
+    let probes = Vec::from_iter((0..36).map(probe)).join(", ");
+    let scene = format!(
+        "mesh.file = 'plate.geo'
+         probe = [{probes}]
+         boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', symmetry = true }},
+                     {{ name = 'right', traction = [1, 0] }}]
+         [material]
+         young = 10
+         poisson = 0.3
+         plane = 'stress'
+         [material.fibre]
+         young = 10"
+    );
+    directory.write("scene.toml", &scene);
+    for options in
+        [&["--accuracy", "0.1"], &["--set", "mesh.size=0.4"], &["--set", "mesh.size=0.2"]]
+    {
+        directory.run(options);
+        let quantities = directory.summary("out/scene")["quantities"].clone();
+        for i in 0..36 {
+            let stress = quantities[format!("p{i}.stress_xx")].as_f64().expect("a stress");
+            assert!((stress - 1.0).abs() < 1e-6, "{options:?}, p{i}: {stress}");
+        }
+    }
+}
+
+/// Two meshes agree on these extremes to a tenth of their errors or less. The closed forms stand in the scenes.
+#[test]
+fn bars_hold_where_two_meshes_agree_by_chance() {
+    let directory = TestDirectory::new();
+    for (scene, geometry, file, figure, truth) in [
+        (
+            include_str!("../../validation/handbook/golovin.toml"),
+            include_str!("../../validation/handbook/sector.geo"),
+            "sector.geo",
+            "principal_max",
+            775.524_356_842_946_6,
+        ),
+        (
+            include_str!("../../validation/handbook/compound_ring.toml"),
+            include_str!("../../validation/handbook/rings.geo"),
+            "rings.geo",
+            "pressure_max",
+            0.879_215_912_366_676_1,
+        ),
+    ] {
+        directory.write("scene.toml", scene);
+        directory.write(file, geometry);
+        directory.run(&["--bars", "--set", "discretisation.displacement=2"]);
+        let summary = directory.summary("out/scene");
+        let value = summary[figure].as_f64().expect("a value");
+        let bar = summary["errors"]["figures"][figure].as_f64().expect("a bar");
+        assert!((value - truth).abs() <= bar && bar < 0.05 * truth, "{figure}: {value} ± {bar}");
+    }
+}
+
 /// A quarter of a ring with radii 1 and 2 under a pressure of 1 in its bore: at the bore Lamé's displacement is
 /// (p/E) ((1 + 4)/(4 − 1) + ν), plane stress.
 #[test]

@@ -141,3 +141,39 @@ fn a_probe_outside_the_body_is_refused() {
     let error = problem(distorted(6), text).expect_err("outside").to_string();
     assert!(error.contains("probe.far.point (0.5, 1.2) lies outside the body"), "{error}");
 }
+
+/// Strains of linear triangles are constant, so that a point inside each of the triangles at a vertex has its strain.
+#[test]
+fn a_probe_at_a_vertex_has_the_mean_stress_of_its_triangles() {
+    let mesh = distorted(4);
+    let distance = |&node: &usize| (mesh.nodes[node][0] - 0.5).hypot(mesh.nodes[node][1] - 0.5);
+    let nodes = 0..mesh.nodes.len();
+    let vertex = nodes.min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("nodes");
+    let around = mesh.triangles.iter().filter(|triangle| triangle.contains(&vertex));
+    let centres = around.map(|nodes| {
+        [0, 1].map(|k| nodes.iter().map(|&node| mesh.nodes[node][k]).sum::<f64>() / 3.0)
+    });
+    let centres: Vec<[f64; 2]> = centres.collect();
+    let probe =
+        |(name, [x, y]): (String, [f64; 2])| format!("{{ name = '{name}', point = [{x}, {y}] }}");
+    let inside = centres.iter().enumerate().map(|(i, at)| (format!("t{i}"), *at));
+    let probes = inside.chain([("vertex".to_owned(), mesh.nodes[vertex])]).map(probe);
+    let text = format!(
+        "discretisation.displacement = 1
+         material = {{ young = 90, poisson = 0.2, plane = 'stress' }}
+         probe = [{}]
+         boundary = [
+            {{ name = 'bottom', displacement = [0, 0] }},
+            {{ name = 'top', traction = ['x^2', '1 - 3*x'] }},
+         ]",
+        Vec::from_iter(probes).join(", ")
+    );
+    let (observed, _) = observed(mesh.clone(), &text);
+    for component in ["stress_xx", "stress_yy", "stress_xy"] {
+        let of = |i: usize| observed[&format!("t{i}.{component}")];
+        let values = Vec::from_iter((0..centres.len()).map(of));
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        close(observed[&format!("vertex.{component}")], mean, 1e-10);
+        assert!(values.iter().any(|value| (value - mean).abs() > 1e-3), "{values:?}");
+    }
+}

@@ -79,7 +79,7 @@ pub(super) struct StepState {
 /// controls the lengths of the steps; a rule of third order estimates their accumulated error.
 const TRUNCATION: f64 = 4.0 / 3.0;
 /// The doubt of the error of a step in a smooth evolution, over k_n times the change of the slope of the rate: half of the
-/// error. With half of it, bars of loads that rise and fall fail; with twice, runs with such loads are repeated.
+/// error. With twice of it, `beam` at 0.01 is repeated with shorter steps.
 const DOUBT: f64 = 1.0 / 6.0;
 /// The same if the rate jumps in the step: the error may exceed its estimate by half of k_n times the jump.
 const OF_JUMP: f64 = 0.5;
