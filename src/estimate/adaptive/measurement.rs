@@ -22,9 +22,9 @@ use crate::{
 /// makes about twice as many triangles; with twice, accuracies are missed.
 const SHARE: f64 = 0.97;
 
-/// A third mesh of at most so many triangles is always worth its run. It protects the seconds of `lshape`, whose first mesh
-/// has 2356 triangles: with a third mesh it took 4.5 s for 0.9.
-const CHEAP: usize = 16_000;
+/// A third mesh of at most so many triangles is always worth its run. It protects seconds: with twice of it, `bridge` at 0.1 takes
+/// twice as long; without a limit, `lshape` at 0.03 took 4.5 s for 0.9.
+const CHEAP: usize = 8_000;
 
 /// A measured error.
 pub(super) struct MeasuredError {
