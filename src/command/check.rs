@@ -200,11 +200,13 @@ fn support(problem: &DiscreteProblem) -> Vec<String> {
 fn cost(problem: &DiscreteProblem) -> String {
     let scene = problem.scene();
     let (nodes, contact) = (problem.body.nodes.points.len() as f64, contact_nodes(problem) as f64);
-    let step = 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);
+    let step_on = |nodes: f64| 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);
+    let step = step_on(nodes);
     let once = 0.05 + 50e-6 * nodes;
     let megabytes = 50.0 + 8e-3 * nodes;
     // As many steps on the mesh as on meshes with 4 and 16 times as many triangles.
-    let bars = INSTANTS as f64 * (1.0 + 4.0 * 1.45 + 16.0 * 2.1) * step + 10.0 * once;
+    let steps: f64 = [1.0, 4.0, 16.0].map(|times| step_on(times * nodes)).iter().sum();
+    let bars = INSTANTS as f64 * steps + 10.0 * once;
     let seconds = match scene.time.map(|grid| grid.stepping) {
         _ if scene.accuracy.is_some() => {
             return "the run chooses mesh and steps for the required accuracy".to_owned();

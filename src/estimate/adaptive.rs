@@ -89,14 +89,12 @@ pub enum AdaptError {
     /// A triangle cannot be divided.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// The run on the mesh of a round failed.
+    /// A run with few steps failed.
     #[error(
-        "round {rounds} of the mesh adaptation, with {triangles} triangles: {source}; to keep the results \
-         up to this error, remove `accuracy`"
+        "a run on {triangles} triangles, for the accuracy or the error bars: {source}; to keep the results up to \
+         this error, ask for neither"
     )]
     Run {
-        /// The number of the round.
-        rounds: usize,
         /// The triangles of its mesh.
         triangles: usize,
         /// The failure of the run.
@@ -209,12 +207,12 @@ pub fn measured_errors(
     }
     let mesh = Refinement::start(mesh.clone()).mesh;
     let mut limits = Limits::new(session.comm(), scene);
-    let (rounds, triangles) = (1, mesh.triangles.len());
+    let triangles = mesh.triangles.len();
     loop {
         let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
         let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, &[]);
         let run = limits.measure(triangles, run);
-        let run = run.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
         if !repeats || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
             let new = Measurement::new(session, &mesh, &run, solver, &[], None, &mut limits);
@@ -245,7 +243,7 @@ fn refined(
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
         let run = || FewStepRun::run(session, &problem, solver, triangles, INSTANTS, &[]);
         let run = limits.measure(triangles, run);
-        let run = run.map_err(|source| AdaptError::Run { rounds, triangles, source })?;
+        let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
         if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
             before.clear();
             continue;

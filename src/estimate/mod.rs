@@ -149,14 +149,10 @@ impl Outcome {
         extremes: &Extremes,
         measured: &Measured,
     ) -> Vec<f64> {
-        let grows = |name: &String| measured.unsettled.contains(name);
-        let of_extremes = problem.extremes().into_iter().zip(extremes.values());
-        let of_extremes =
-            of_extremes.map(|(name, size)| if grows(&name) { 0.0 } else { size.abs() });
-        let of_extremes = Vec::from_iter(of_extremes);
-        let names = problem.figure_names();
+        let of_extremes = Vec::from_iter(extremes.values().into_iter().map(f64::abs));
+        let (names, unsettled) = (problem.figure_names(), &measured.unsettled);
         let scales = |sizes: &[f64], forces: f64| {
-            let scales = problem.figure_scales(&[sizes, &of_extremes].concat(), 0.0, forces);
+            let scales = problem.figure_scales([sizes, &of_extremes], unsettled, 0.0, forces);
             let of = |bar: &Bar| names.iter().position(|name| *name == bar.name);
             Vec::from_iter(self.bars.iter().map(|bar| of(bar).map_or(0.0, |i| scales[i])))
         };

@@ -27,8 +27,8 @@ pub struct PointValues {
 const OUTSIDE: f64 = 0.05;
 /// A triangle is a candidate if the point lies outside its chords by at most this fraction of its height.
 const NEAR: f64 = 0.5;
-/// λ above the negative of this is rounding.
-const TIES: f64 = 1e-9;
+/// The rounding of λ at points on the sides of a triangle.
+pub(crate) const ON_SIDE: f64 = 1e-9;
 /// The number of Newton steps for λ in a curved triangle.
 const CORRECTIONS: usize = 8;
 
@@ -51,7 +51,7 @@ impl Location {
         };
         let material = |of: &Self| body.material(of.triangle);
         near.retain(|of| {
-            depth(of) >= depth(&best).min(0.0) - TIES && material(of) == material(&best)
+            depth(of) >= depth(&best).min(0.0) - ON_SIDE && material(of) == material(&best)
         });
         near
     }

@@ -150,12 +150,20 @@ impl DiscreteProblem {
     }
 
     /// The scale of each figure: the maximum of its group in a run, and at least a part of its natural scale. From the
-    /// `largest` [sizes](Self::figure_sizes), ‖u‖² (`energy`, N m per metre of thickness) and Σ|f| (`forces`, N per metre
+    /// `largest` [sizes](Self::figure_sizes) and extremes, ‖u‖² (`energy`, N m per metre of thickness) and Σ|f| (`forces`, N per metre
     /// of thickness) of the run. All forces may balance, as in pure bending; their sum of moduli does not vanish.
-    pub(crate) fn figure_scales(&self, largest: &[f64], energy: f64, forces: f64) -> Vec<f64> {
+    /// An extreme that the meshes leave `unsettled` is no scale of the others.
+    pub(crate) fn figure_scales(
+        &self,
+        largest: [&[f64]; 2],
+        unsettled: &[String],
+        energy: f64,
+        forces: f64,
+    ) -> Vec<f64> {
         let figures = self.figures();
+        let sizes = || figures.iter().zip(largest.into_iter().flatten());
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
-            let like = figures.iter().zip(largest).filter(|(figure, _)| is_like(figure));
+            let like = sizes().filter(|(of, _)| is_like(of) && !unsettled.contains(&of.name));
             like.map(|(_, value)| *value).fold(0.0, f64::max)
         };
         let lever = self.body.radius_of_gyration();

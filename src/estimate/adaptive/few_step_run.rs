@@ -95,16 +95,11 @@ impl<'a> FewStepRun<'a> {
         &self.history.depths
     }
 
-    /// The scales of the figures. An extreme that `grows` is no scale of the others.
-    pub(super) fn scales(&self, grows: &[String]) -> Vec<f64> {
+    /// The scales of the figures. An extreme that is `unsettled` is no scale of the others.
+    pub(super) fn scales(&self, unsettled: &[String]) -> Vec<f64> {
         let History { sizes_of_extremes, energy, .. } = &self.history;
-        let names = self.problem.extremes();
-        let of_extremes = names
-            .iter()
-            .zip(sizes_of_extremes)
-            .map(|(name, &size)| if grows.iter().any(|grown| grown == name) { 0.0 } else { size });
-        let sizes = Vec::from_iter(self.outcome.sizes.iter().copied().chain(of_extremes));
-        self.problem.figure_scales(&sizes, *energy, self.outcome.last.forces)
+        let sizes = [&self.outcome.sizes, sizes_of_extremes].map(Vec::as_slice);
+        self.problem.figure_scales(sizes, unsettled, *energy, self.outcome.last.forces)
     }
 
     /// The times at which steps end, s.

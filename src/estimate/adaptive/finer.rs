@@ -1,7 +1,10 @@
 //! The mesh of a measurement: bisected everywhere.
 
 use super::sizes::areas;
-use crate::mesh::{Mesh, MeshError, Refinement, twice_area};
+use crate::{
+    fem::ON_SIDE,
+    mesh::{Mesh, MeshError, Refinement, twice_area},
+};
 
 /// A mesh whose triangles have half the size of those of a coarse mesh.
 pub(super) struct Finer {
@@ -35,8 +38,6 @@ impl Finer {
 /// Per triangle: does it touch one of the points? A point outside all triangles, as beyond a chord, touches the nearest
 /// ones.
 pub(super) fn touching(mesh: &Mesh, points: &[[f64; 2]]) -> Vec<bool> {
-    /// Relative rounding of coordinates on the sides of a triangle.
-    const ROUNDING: f64 = 1e-9;
     let mut touching = vec![false; mesh.triangles.len()];
     for &point in points {
         // The smallest barycentric coordinate of the point.
@@ -48,7 +49,7 @@ pub(super) fn touching(mesh: &Mesh, points: &[[f64; 2]]) -> Vec<bool> {
         let depths: Vec<f64> = mesh.triangles.iter().map(depth).collect();
         let deepest = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         for (touches, depth) in touching.iter_mut().zip(depths) {
-            *touches |= depth >= deepest.min(0.0) - ROUNDING;
+            *touches |= depth >= deepest.min(0.0) - ON_SIDE;
         }
     }
     touching

@@ -44,7 +44,8 @@ impl Limits {
         result
     }
 
-    /// Why runs on so many `triangles`, one after the other, are not begun, if they would exceed a limit. Collective.
+    /// The reason why runs on meshes with these numbers of `triangles` must not start: together they would exceed a limit. `None`
+    /// if they may start. Collective.
     pub(super) fn exceeded(&self, triangles: &[usize]) -> Option<String> {
         let [(before, first), (last, second)] = self.runs;
         let cost = |count: &usize, i: usize| {

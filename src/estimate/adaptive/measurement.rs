@@ -12,6 +12,7 @@ use super::{
     sequence::{Level, Sequence},
 };
 use crate::{
+    estimate::Extreme,
     evolution::AIM,
     mesh::{Mesh, Order},
     petsc::Session,
@@ -22,8 +23,9 @@ use crate::{
 /// makes about twice as many triangles; with twice, accuracies are missed.
 const SHARE: f64 = 0.97;
 
-/// A third mesh of at most so many triangles is always worth its run. It protects seconds: with twice of it, `bridge` at 0.1 takes
-/// twice as long; without a limit, `lshape` at 0.03 took 4.5 s for 0.9.
+/// A third mesh with at most this number of triangles is used in any case. A larger one is used only if two meshes do not decide,
+/// because its run may take longer than all others. With twice this number, `bridge` at 0.1 takes twice the time; with any number,
+/// `lshape` at 0.03 takes 4.5 s and not 0.9 s.
 const CHEAP: usize = 8_000;
 
 /// A measured error.
@@ -83,10 +85,12 @@ pub(super) struct Measurement {
     /// Per triangle: its share of the squared error of ζ, and max |Δζ|; empty without damage.
     of_damage: Vec<f64>,
     zeta: Vec<f64>,
-    /// The names of the extremes.
+    /// The names of the extremes, with those of the lengths of contact; none if the run ends at ζ_*.
     extremes: Vec<String>,
-    /// The names of figures at points, or of probes, with these points, m.
-    places: Vec<(String, [f64; 2])>,
+    /// The extremes of stresses and pressures on the bisected mesh.
+    of_points: Vec<Extreme>,
+    /// The probes with their points, m.
+    probes: Vec<(String, [f64; 2])>,
 }
 
 impl Measurement {
@@ -114,7 +118,7 @@ impl Measurement {
         let triangles = finer.mesh.triangles.len();
         let of_fine = problem(&finer.mesh)?;
         let run = || FewStepRun::run(session, &of_fine, solver, triangles, FEW, coarse.times());
-        let failed = |source| AdaptError::Run { rounds: before.len() + 1, triangles, source };
+        let failed = |source| AdaptError::Run { triangles, source };
         let fine = limits.measure(triangles, run).map_err(failed)?;
         let answer = Level::new(coarse, mesh.clone());
         let mut levels = vec![Level::new(&fine, finer.mesh.clone())];
@@ -154,6 +158,8 @@ impl Measurement {
     ) -> Self {
         let problem = coarse.problem;
         let mut measured = Self::default();
+        let probes = problem.scene().probes.iter();
+        measured.probes = probes.map(|probe| (probe.name.clone(), probe.point)).collect();
         let (displacement, of_parts) = fine.relative();
         measured.displacement = displacement;
         // The squared error of order p on the whole triangle is 4^p times the sum on its parts.
@@ -174,6 +180,8 @@ impl Measurement {
             measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
             measured.zeta = largest;
         }
+        measured.extremes = problem.extremes();
+        measured.of_points = fine.extremes().named(&problem.singular_points());
         measured
     }
 
@@ -184,21 +192,16 @@ impl Measurement {
             return;
         }
         let problem = coarse.problem;
-        let named = fine.extremes().named(&problem.singular_points());
-        let probes = problem.scene().probes.iter().map(|probe| (probe.name.clone(), probe.point));
-        let of_extremes = named.iter().map(|extreme| (extreme.name.clone(), extreme.at));
-        // A material may have the name of a probe.
-        self.places = of_extremes.chain(probes).collect();
-        self.extremes = problem.extremes();
-        let first = problem.figure_names().len() - self.extremes.len();
         // The extreme of the whole settles if that of its part does.
         let part = |i: usize| fine.extremes().part_of(i);
-        let settles = |&i: &usize| sequence.settles(first + part(i), &named[part(i)]);
-        let unsettled = (0..named.len()).filter(|i| !settles(i));
-        self.unsettled = unsettled.map(|i| named[i].name.clone()).collect();
+        let first = problem.figure_names().len() - self.extremes.len();
+        let settles = |&i: &usize| sequence.settles(first + part(i), &self.of_points[part(i)]);
+        let unsettled = (0..self.of_points.len()).filter(|i| !settles(i));
+        self.unsettled = unsettled.map(|i| self.of_points[i].name.clone()).collect();
         let error = |(i, dimension)| match dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
-            dimension => sequence.error(i, dimension),
+            Dimension::Stress => sequence.error_of_stress(i),
+            _ => sequence.error(i),
         };
         let errors = Vec::from_iter(problem.dimensions().into_iter().enumerate().map(error));
         self.bars = problem.bars(&errors, &fine.scales(&self.unsettled));
@@ -220,7 +223,9 @@ impl Measurement {
     /// Why a figure in `names` has no accuracy, if the meshes do not settle one.
     pub(super) fn without_accuracy(&self, names: &[String]) -> Option<String> {
         let name = names.iter().find(|name| self.unsettled.contains(name))?;
-        Some(format!("{name} is singular: it grows as the mesh is refined; ask for other figures"))
+        Some(format!(
+            "{name} changes with every finer mesh, as a singular stress does; ask for other figures"
+        ))
     }
 
     /// The errors of a run on the mesh.
@@ -260,15 +265,18 @@ impl Measurement {
             let of_damage = || Cause::Damage(self.of_damage.clone());
             return if name == "damage" { of_damage() } else { Cause::Fields(1.0) };
         };
-        let is_here = |(place, _): &&(String, _)| {
-            name.strip_prefix(place).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        let at_probe = |(probe, _): &&(String, _)| {
+            name.strip_prefix(probe).is_some_and(|rest| rest.starts_with('.'))
         };
-        match (bar.dimension, self.places.iter().find(is_here)) {
+        // A material may have the name of a probe.
+        let of_extreme = self.of_points.iter().find(|of| of.name == name).map(|of| of.at);
+        let at = of_extreme.or_else(|| self.probes.iter().find(at_probe).map(|probe| probe.1));
+        match (bar.dimension, at) {
             (Dimension::ContactLength, _) => Cause::Ends,
             (Dimension::Damage, _) if name != "zeta_mean" => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
-            (Dimension::Length, Some((_, at))) => Cause::Around(*at, 0),
-            (_, Some((_, at))) => Cause::Around(*at, 1),
+            (Dimension::Length, Some(at)) => Cause::Around(at, 0),
+            (_, Some(at)) => Cause::Around(at, 1),
             _ => Cause::FIGURE,
         }
     }

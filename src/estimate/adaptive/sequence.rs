@@ -10,11 +10,7 @@
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
 use super::{few_step_run::FewStepRun, finer::size_at};
-use crate::{
-    estimate::Extreme,
-    mesh::Mesh,
-    problem::{Dimension, SEEN},
-};
+use crate::{estimate::Extreme, mesh::Mesh, problem::SEEN};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The factors of a bar, and of that of a stress. Of 720 bars of the handbook without damage 8 failed with 1.5 for all, 127 with
@@ -84,8 +80,8 @@ impl<'a> Sequence<'a> {
         1.0 / (1.0 - self.rate)
     }
 
-    /// The bar, from the `difference` of a figure between a level and the finest one.
-    fn bar(&self, difference: impl Fn(&Level, &Level) -> f64) -> f64 {
+    /// The bar with the factor `safety`, from the `difference` of a figure between a level and the finest one.
+    fn bar(&self, safety: f64, difference: impl Fn(&Level, &Level) -> f64) -> f64 {
         let [coarser @ .., finest] = &self.levels[..] else { return 0.0 };
         let (before, from_answer) = coarser.split_at(self.answer);
         let weighted = before.iter().map(|level| {
@@ -98,19 +94,24 @@ impl<'a> Sequence<'a> {
         });
         let changes = Vec::from_iter(from_answer.iter().map(|level| difference(level, finest)));
         let largest = changes.iter().copied().chain(weighted.reduce(f64::min)).fold(0.0, f64::max);
-        SAFETY[0] * (largest + changes[changes.len() - 1] * self.rate / (1.0 - self.rate))
+        safety * (largest + changes[changes.len() - 1] * self.rate / (1.0 - self.rate))
     }
 
     /// The bar of the figure `i`.
-    pub(super) fn error(&self, i: usize, dimension: Dimension) -> f64 {
-        let bar = self.bar(|a, b| (a.values[i] - b.values[i]).abs());
-        if dimension == Dimension::Stress { SAFETY[1] / SAFETY[0] * bar } else { bar }
+    pub(super) fn error(&self, i: usize) -> f64 {
+        self.bar(SAFETY[0], |a, b| (a.values[i] - b.values[i]).abs())
+    }
+
+    /// The bar of the figure `i`, a stress.
+    pub(super) fn error_of_stress(&self, i: usize) -> f64 {
+        self.bar(SAFETY[1], |a, b| (a.values[i] - b.values[i]).abs())
     }
 
     /// The bar of the figure `i`, a length of contact. A change within the open parts is no error beyond them.
     pub(super) fn error_of_length(&self, i: usize) -> f64 {
         let change = |a: &Level, b: &Level| (a.values[i] - b.values[i]).abs() - a.open - b.open;
-        SAFETY[0] * self.levels[self.answer].open + self.bar(|a, b| change(a, b).max(0.0))
+        SAFETY[0] * self.levels[self.answer].open
+            + self.bar(SAFETY[0], |a, b| change(a, b).max(0.0))
     }
 
     /// The bar of the time of ζ_*, and this time, s. It is infinite if the answer or a finer mesh does not stop; `None` if none
@@ -121,7 +122,10 @@ impl<'a> Sequence<'a> {
         if times.clone().any(|time| time.is_none()) {
             return Some([f64::INFINITY, time]);
         }
-        Some([self.bar(|a, b| a.stop.zip(b.stop).map_or(0.0, |(a, b)| (a - b).abs())), time])
+        Some([
+            self.bar(SAFETY[0], |a, b| a.stop.zip(b.stop).map_or(0.0, |(a, b)| (a - b).abs())),
+            time,
+        ])
     }
 
     /// Does the figure `i` settle, an extreme at the place of `extreme` on the finest mesh? Its change per halving of the size
