@@ -223,10 +223,13 @@ impl Extremes {
             // The von Mises stress, as other stresses may be negative at the point, or the pressure.
             let is_pressure = extreme.name.ends_with("pressure_max");
             let field = &self.fields[if is_pressure { i } else { i - i % 3 }];
+            let value = |place: [f64; 2]| {
+                let own = field.iter().filter(|(_, at)| *at == place).map(|(value, _)| *value);
+                self.comm.max(own.fold(f64::NEG_INFINITY, f64::max))
+            };
             let there = |point: &&Singular| {
-                let own = field.iter().filter(|(_, at)| *at == point.at).map(|(value, _)| *value);
-                let there = self.comm.max(own.fold(f64::NEG_INFINITY, f64::max));
-                there >= 0.5 * extreme.value.abs() || !there.is_finite() || point.at == extreme.at
+                let there = value(point.at);
+                there >= 0.5 * value(extreme.at) || !there.is_finite()
             };
             nearest.filter(there).map(|point| point.name.clone())
         };

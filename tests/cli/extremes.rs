@@ -192,3 +192,37 @@ fn linear_triangles_that_lock_have_no_bars_and_say_so() {
         );
     }
 }
+
+/// Where a foundation ends under a body, stresses and pressures grow like r^−½ with every finer mesh; the length of contact
+/// does not.
+#[test]
+fn extremes_at_the_end_of_a_foundation_have_no_bars_and_its_length_has_one() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "ledge.geo",
+        "Point(1) = {0, 0, 0, 0.2}; Point(2) = {0.5, 0, 0, 0.2}; Point(3) = {1, 0, 0, 0.2};
+         Point(4) = {1, 1, 0, 0.2}; Point(5) = {0, 1, 0, 0.2};
+         Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 5}; Line(5) = {5, 1};
+         Curve Loop(1) = {1, 2, 3, 4, 5}; Plane Surface(1) = {1};
+         Physical Curve('ledge') = {1}; Physical Curve('top') = {4}; Physical Curve('left') = {5};
+         Physical Surface('material') = {1};\n",
+    );
+    directory.write(
+        "scene.toml",
+        "mesh.file = 'ledge.geo'
+         discretisation.displacement = 2
+         material = { young = 1000, poisson = 0.3, plane = 'strain' }
+         boundary = [{ name = 'ledge', gap = '0' }, { name = 'left', symmetry = true },
+                     { name = 'top', displacement = [0, -0.01] }]",
+    );
+    for options in [&["--bars"][..], &["--accuracy", "0.05"]] {
+        directory.run(options);
+        let summary = directory.summary("out/scene");
+        let bar = |name: &str| summary["errors"]["figures"][name].as_f64();
+        for name in ["pressure_max", "von_mises_max", "principal_min"] {
+            assert_eq!(summary["extremes"][name]["singular"], "the end of `ledge`", "{options:?}");
+            assert_eq!(bar(name), None, "{options:?}: {name}");
+        }
+        assert!(bar("contact_length").is_some() && bar("work").is_some(), "{options:?}");
+    }
+}
