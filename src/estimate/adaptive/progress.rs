@@ -3,8 +3,8 @@
 use super::measurement::{MeasuredError, Measurement};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of measurements before, with which an error is compared. With half of it, five of 273 runs of the handbook end without
-/// an accuracy that a finer mesh reaches.
+/// An error is compared with those of this number of measurements before it. With half of this number, five of 273 runs of the
+/// handbook end with "NOT reached", although finer meshes reach the accuracy.
 const BEFORE: usize = 4;
 
 /// The errors of the rounds so far, over the errors that the accuracy allows.

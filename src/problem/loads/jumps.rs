@@ -11,8 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// 2⁻⁵⁰.
 const JUMP: f64 = 1e-6;
 
-/// The change of a function of the place, m, between the middles of the edges pq and qr that bisection does not make smaller.
-/// It follows the larger change of `value`(side, place), with the side 0 of pq and 1 of qr. A jump does not vanish.
+/// The jump of the function `value`(side, place) between the middles of the edges pq (side 0) and qr (side 1); 0 if it is
+/// continuous. Bisection follows the half with the larger change: the change of a continuous function vanishes, a jump stays.
 pub(crate) fn jump<const N: usize>(
     [p, q, r]: [[f64; 2]; 3],
     value: impl Fn(usize, [f64; 2]) -> [f64; N],
