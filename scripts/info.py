@@ -11,25 +11,32 @@ import sys
 from pathlib import Path
 
 from bars import barred
-from signorini_summaries import bars
+from signorini_summaries import bars, flag_of
 
 
 def row(name, value):
     return f"  {name:<30} {value}"
 
 
+def text_of_figure(figure):
+    """The value of a figure with its bar, its unit, and why the mesh does not determine it."""
+    flag, reason = flag_of(figure)
+    value = barred(figure["value"], figure["bar"]) if figure["bar"] else json.dumps(figure["value"])
+    return f"{value} {figure['unit']} {flag and f'{flag}: {reason}'}".strip()
+
+
 def entry(name, value, errors):
     """The lines of an entry of summary.json, or of the entries of a table. Figures are printed with their error
     bars."""
-    if name == "errors.figures":
-        return []
+    if name == "figures":
+        return [row(figure, text_of_figure(of)) for figure, of in value.items() if of["value"] is not None]
     if isinstance(value, dict):
         return [line for below in value for line in entry(f"{name}.{below}", value[below], errors)]
     if isinstance(value, list):
         # Others than notes are for figures.
         words = [word for word in value if isinstance(word, str)]
         return [row(name, " ".join(words))] if name.endswith("command") else [row(name, word) for word in words]
-    bar = errors.get(name.removeprefix("quantities."))
+    bar = errors.get(name)
     text = value if isinstance(value, str) else bar and barred(value, bar) or json.dumps(value)
     return [] if value is None else [row(name, text)]
 

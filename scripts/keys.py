@@ -1,16 +1,18 @@
 #!/usr/bin/python3
 """Prints the reference of the keys of a scene, geo/KEYS.md, from their JSON schema:
 
-    scripts/keys.py geo/scene.schema.json > geo/KEYS.md
+    scripts/keys.py geo/scene.schema.json target/debug/signorini > KEYS.md
 
 The schema has two additional annotations: `values` describes the values and their unit; `absent` describes
-the behaviour without the key if there is no single default. The introduction is scripts/keys.md."""
+the behaviour without the key if there is no single default. The introduction is scripts/keys.md; the program prints the
+table of the figures."""
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
-TABLES = "(the tables of keys)\n"
+TABLES, FIGURES = "(the tables of keys)\n", "(the table of figures)\n"
 
 
 def section(title, path, meaning, table):
@@ -68,4 +70,5 @@ if __name__ == "__main__":
     schema = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     tables = "\n".join(section("At the top of the file", "", "", schema)) + "\n"
     page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
-    print(page.replace(TABLES, tables), end="")
+    figures = subprocess.run([sys.argv[2], "keys", "--figures"], check=True, capture_output=True, text=True).stdout
+    print(page.replace(TABLES, tables).replace(FIGURES, figures), end="")

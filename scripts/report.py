@@ -30,7 +30,7 @@ from maps import draw_state
 from reading import evenly, read_results, states
 from report_pdf import FULL, HIGHEST, SPACE, pages_of
 from results import telling
-from signorini_summaries import bars, flag_of, folders_of, unit_of, value_of
+from signorini_summaries import bars, flag_of, folders_of, unit_of
 from table import text_of
 
 # The largest number of frames of the slider.
@@ -44,9 +44,7 @@ TASKS = {}
 # Values of summary.json for the last state, with their names.
 FACTS = {
     "solver": "contact solver", "ranks": "ranks", "nodes": "nodes", "triangles": "triangles", "steps": "time steps",
-    "end_time": "last time", "stopped_by": "stopped by", "stopped_at": "stopped at", "zeta_min": "least ζ",
-    "zeta_mean": "mean ζ", "displacement_max": "largest displacement", "work": "work of the loads",
-    "contact_force": "sum of contact reactions", "active_nodes": "active nodes", "contact_nodes": "contact nodes",
+    "end_time": "last time", "stopped_by": "stopped by", "stopped_at": "stopped at", "active_nodes": "active nodes", "contact_nodes": "contact nodes",
 }
 ERRORS = {
     "displacement_mesh": "u, from the mesh (energy norm)",
@@ -132,26 +130,20 @@ def template():
 def facts(results, left_out=()):
     """The values of summary.json for the last state, and the given quantities by name. Names that end with one of
     `left_out` are left out."""
-    summary, units, errors = results.summary, results.units, bars(results.summary)
-    extremes = summary.get("extremes") or {}
-    has_one = sum(name.endswith(".contact_length") for name in summary.get("quantities", {})) == 1
+    summary, errors = results.summary, bars(results.summary)
+    figures = summary.get("figures") or {}
 
     def text(name, value):
-        # A lone foundation has the length and the largest pressure of all contact.
-        of_all = name.rpartition(".")[2] if has_one and name.endswith((".contact_length", ".pressure_max")) else name
-        flag, _ = flag_of(extremes.get(name) or extremes.get(of_all))
+        flag, _ = flag_of(figures.get(name))
         if flag:
             return f"{value:.2g}, {flag}"
         is_rounded = summary.get("stopped_at") is not None and isinstance(value, float)
-        return barred(value, errors.get(of_all)) or (three_digits(value) if is_rounded else value)
+        return barred(value, errors.get(name)) or (three_digits(value) if is_rounded else value)
 
-    rows = [(name, text(key, summary[key]), unit_of(key, units))
+    rows = [(name, text(key, summary[key]), unit_of(key, summary))
             for key, name in FACTS.items() if summary.get(key) is not None]
-    # The extremes in each of several materials.
-    inside = {name: of["value"] for name, of in extremes.items() if "." in name}
-    return rows + [(name, text(name, value), unit_of(f"quantities.{name}", units))
-                   for name, value in {**summary.get("quantities", {}), **inside}.items()
-                   if not name.endswith(tuple(left_out))]
+    return rows + [(of["label"], text(name, of["value"]), of["unit"]) for name, of in figures.items()
+                   if of["value"] is not None and not name.endswith(tuple(left_out))]
 
 
 def governing(everything, units):
@@ -172,7 +164,7 @@ def governing(everything, units):
         if value == (1.0 if name == "least ζ" else 0.0):
             continue
         x, y = state.nodes[node]
-        extreme = (value_of(state.summary, f"extremes.{key}") if state.is_last else None) or {}
+        extreme = (state.summary["figures"].get(key) if state.is_last else None) or {}
         is_there = extreme and np.allclose(extreme["at"], (x, y), atol=1e-9 * state.size)
         flag, reason = flag_of(extreme if is_there else None)
         plain = least_zeta(value) if key == "zeta_min" else f"{value:.{2 if flag else 4}g}"
@@ -191,9 +183,9 @@ def body(results):
             ("plane", str(material.get("plane", "")))]
     surfaces = [name for name, of in material.items() if isinstance(of, dict)]
     rows += [(name, results.elasticity(name)) for name in ("material", *surfaces)]
-    quantities = results.summary.get("quantities", {})
-    for name in dict.fromkeys(key.rpartition(".")[0] for key in quantities if key.endswith(".moment")):
-        x, y, moment = (quantities[f"{name}.{part}"] for part in ("force_x", "force_y", "moment"))
+    figures = results.summary.get("figures", {})
+    for name in dict.fromkeys(key.rpartition(".")[0] for key in figures if key.endswith(".moment")):
+        x, y, moment = (figures[f"{name}.{part}"]["value"] for part in ("force_x", "force_y", "moment"))
         rows.append((f"on the body at {name}", f"force ({x:.5g}, {y:.5g}) {units['line']}, "
                      f"moment about (0, 0) {moment:.5g} {units['force']}"))
     return rows

@@ -190,7 +190,7 @@ class Results:
 
     def singular(self, name="von_mises_max"):
         """What makes an extreme stress of the last state singular; None if nothing does, and at other times."""
-        largest = (self.summary.get("extremes") or {}).get(name) or {}
+        largest = self.summary.get("figures", {}).get(name) or {}
         return largest.get("singular") if self.is_last else None
 
     @property
@@ -246,8 +246,7 @@ def of_material(results):
     own = lambda of: {key.removeprefix(name): value for key, value in (of or {}).items() if key.startswith(name)}
     inside = np.isin(np.arange(len(results.nodes)), results.pieces.elements[results.shown])
     return replace(
-        results, summary={**results.summary, "errors": {"figures": own(bars(results.summary))},
-                          "extremes": own(results.summary.get("extremes"))},
+        results, summary={**results.summary, "figures": own(results.summary.get("figures"))},
         zeta=np.where(inside, results.zeta, results.zeta[inside].max()), von_mises=results.von_mises * inside,
         principal=results.principal * inside[:, None])
 

@@ -2,12 +2,12 @@
 
     from signorini_results import load, run, table
     result = load("out/lshape")                  # or run("geo/lshape.toml", "--bars", mesh={"size": 0.5})
-    result.summary["work"], result.times, result.history["contact_force"]
+    result.figures["work"]["value"], result.times, result.history["contact_force"]
     frame = result.frame(0.5)                    # the frame nearest to t = 0.5; without a time the last one
     frame.field("zeta"), frame.field("stress_yy"), frame.at((3, 5), "strain_xx"), frame.gradient((3, 5), "zeta")
     along, zeta = frame.line((0, 5), (8, 5), "zeta")
     along, pressure = frame.along("foundation", "normal_pressure")
-    table(["out/lshape", "out/beam"], ["work", "quantities.clamp.force_y"])
+    table(["out/lshape", "out/beam"], ["work", "clamp.force_y"])
 """
 
 import csv
@@ -98,6 +98,11 @@ class Run:
     def __init__(self, folder):
         self.folder = Path(folder)
         self.summary = json.loads((self.folder / "summary.json").read_text(encoding="utf-8"))
+
+    @property
+    def figures(self):
+        """Name of a figure → its label, unit, value in the last state, error bar, place, and governing value in the run."""
+        return self.summary["figures"]
 
     @cached_property
     def history(self):

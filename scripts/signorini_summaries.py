@@ -1,6 +1,8 @@
 """Reads summary.json of runs: figures with their error bars and units, as rows of a table."""
 
+import difflib
 import json
+import sys
 from pathlib import Path
 
 # The columns of a table, by default.
@@ -8,12 +10,8 @@ COLUMNS = ("end_time", "stopped_by", "stopped_at", "zeta_min", "displacement_max
            "contact_force", "von_mises_max", "wall_seconds")
 # The ends of columns with the reason why the mesh does not determine an extreme.
 FLAGS = (".singular", ".unresolved")
-# Kinds of units by names of values; "s" and "MB" do not depend on the scene.
-UNITS = {
-    "end_time": "time", "stopped_at": "time", "displacement_max": "length", "contact_length": "length", "work": "work",
-    "contact_force": "line", "von_mises_max": "stress", "principal_max": "stress", "principal_min": "stress",
-    "pressure_max": "stress", "wall_seconds": "s", "seconds_per_step": "s", "peak_megabytes": "MB",
-}
+# Kinds of units of values that are no figures; "s" and "MB" do not depend on the scene.
+UNITS = {"end_time": "time", "stopped_at": "time", "wall_seconds": "s", "seconds_per_step": "s", "peak_megabytes": "MB"}
 
 
 def summary_of(folder):
@@ -41,18 +39,40 @@ def option_of(summary, name):
             if word == option or word.startswith(f"{option}=")]
 
 
+def figure_of(summary, name):
+    """The figure of a run with the longest name that begins `name`, and the rest of it: (figure, ["bar"]) for `work.bar`."""
+    figures, parts = summary.get("figures") or {}, name.split(".")
+    known = (k for k in range(len(parts), 0, -1) if ".".join(parts[:k]) in figures)
+    k = next(known, 0)
+    return figures.get(".".join(parts[:k])), parts[k:]
+
+
 def value_of(summary, name, absent=None):
-    """A value by its full name, or `absent`. Names of quantities contain points."""
-    if name in summary:
-        return summary[name]
-    first, _, rest = name.partition(".")
-    return value_of(summary[first], rest, absent) if isinstance(summary.get(first), dict) else absent
+    """A value by its full name, or `absent`: of a figure, `NAME`, `NAME.governing`, `NAME.governing.time`, or an entry of
+    summary.json by its path, `errors.solver`."""
+    value, path = figure_of(summary, name)
+    for part in path if value else name.split("."):
+        value = summary if value is None else value
+        if not isinstance(value, dict) or part not in value:
+            return absent
+        value = value[part]
+        if value is None:
+            break
+    return value.get("value", value) if isinstance(value, dict) else value
+
+
+def named(columns):
+    """Names of columns. Figures had `quantities.` before their names in an earlier release."""
+    if old := [name for name in columns if name.startswith("quantities.")]:
+        print(f"note: write {old[0].removeprefix('quantities.')}, without `quantities.`", file=sys.stderr)
+    return [name.removeprefix("quantities.") for name in columns]
 
 
 def bars(summary):
-    """The error bars of a run by the names of figures; empty without estimates."""
-    figures = (summary.get("errors") or {}).get("figures") or {}
-    return {name: bar for name, bar in figures.items() if bar is not None}
+    """The error bars of a run by the names of figures, and that of the time of a stop; empty without estimates."""
+    found = {name: of.get("bar") for name, of in (summary.get("figures") or {}).items()}
+    found["stopped_at"] = summary.get("stopped_uncertainty")
+    return {name: bar for name, bar in found.items() if bar is not None}
 
 
 def flag_of(extreme):
@@ -70,16 +90,14 @@ def units_of(summary):
     return {**units, "work": work, "line": f"{force}/{length}", "area": area, "volume": f"{force}/{length}³"}
 
 
-def unit_of(name, units):
+def unit_of(name, summary):
     """The unit of a value of the summary; "" without a unit."""
-    figure = name.removeprefix("errors.figures.").removeprefix("quantities.")
-    last = figure.rpartition(".")[2]
-    if last in UNITS:
-        return units.get(UNITS[last], UNITS[last])
-    lengths = dict.fromkeys(("u", "contact", "peak", "acts"), "length")
-    kinds = {"force": "line", "moment": "force", "zeta": "", **lengths}
-    kind = kinds.get(last.split("_")[0], "stress") if figure != name else ""
-    return units.get(kind, "")
+    figure, rest = figure_of(summary, name)
+    units = units_of(summary)
+    if figure:
+        return units["time"] if rest[-1:] == ["time"] else figure.get("unit", "")
+    kind = UNITS.get(name.rpartition(".")[2], "")
+    return units.get(kind, kind)
 
 
 def rows_of(folders, summaries, columns, settings=None):
@@ -98,10 +116,10 @@ def rows_of(folders, summaries, columns, settings=None):
         row = {"run": Path(folder).name, **{name: of.get(name) for name in names}}
         for name in columns:
             row[name] = value_of(summary, name)
-            row[f"{name}.bar"] = bars(summary).get(name.removeprefix("quantities."))
-            extreme = (summary.get("extremes") or {}).get(name.removeprefix("quantities.")) or {}
-            row.update({f"{name}{flag}": extreme.get(flag[1:]) for flag in FLAGS})
-            if summary and (unit := unit_of(name, units_of(summary))):
+            row[f"{name}.bar"] = bars(summary).get(name)
+            figure = (summary.get("figures") or {}).get(name) or {}
+            row.update({f"{name}{flag}": figure.get(flag[1:]) for flag in FLAGS})
+            if summary and (unit := unit_of(name, summary)):
                 units.setdefault(name, {})[unit] = units.setdefault(f"{name}.bar", {})[unit] = None
         row["reached"] = {True: "yes", False: "no"}.get(summary.get("reached"))
         error = summary.get("error")
@@ -121,5 +139,7 @@ def unknown(columns, summaries):
         first, point, _ = name.partition(".")
         tables = [summary[first] for summary in summaries if point and isinstance(summary.get(first), dict)]
         there = {f"{first}.{key}" for table in tables for key in table}
-        there = there or {key for summary in summaries for key in summary}
-        yield f"no summary has {name}; there are {', '.join(sorted(there))}"
+        there |= {key for summary in summaries for key in (*(summary.get("figures") or ()), *summary)}
+        near = difflib.get_close_matches(name, sorted(there), 3)
+        yield f"no summary has {name}; " + (f"did you mean {' or '.join(near)}?" if near else (
+            "`signorini info OUT` lists all names"))

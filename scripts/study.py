@@ -29,7 +29,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from signorini_summaries import COLUMNS, rows_of, summary_of
+from signorini_summaries import COLUMNS, named, rows_of, summary_of
 from table import printed, refused, write_table
 
 # The longest name of a folder.
@@ -204,7 +204,7 @@ def main(prog=None):
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help=(
         "runs at once (default: the cores that this process may use)"))
     parser.add_argument("--frames", action="store_true", help="with frames, as `run` writes them")
-    parser.add_argument("--columns", type=lambda text: text.split(","), default=COLUMNS, metavar=(
+    parser.add_argument("--columns", type=lambda text: named(text.split(",")), default=COLUMNS, metavar=(
         "NAME,…"), help="of the table, as for `signorini table`")
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)

@@ -2,7 +2,7 @@
 """Prints the summaries of runs as a table: a row for each folder, with the values that were set, and columns of
 summary.json with their units and error bars.
 
-    signorini table out/*/ --columns end_time,stopped_at,quantities.clamp.force_y
+    signorini table out/*/ --columns end_time,stopped_at,clamp.force_y,displacement_max.governing
 """
 
 import argparse
@@ -10,7 +10,7 @@ import csv
 import sys
 
 from bars import barred
-from signorini_summaries import COLUMNS, FLAGS, flag_of, folders_of, rows_of, summary_of, unknown
+from signorini_summaries import COLUMNS, FLAGS, flag_of, folders_of, named, rows_of, summary_of, unknown
 
 
 def text_of(value):
@@ -70,8 +70,8 @@ def main(prog=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="folders of results")
-    parser.add_argument("--columns", type=lambda text: text.split(","), default=COLUMNS, metavar=(
-        "NAME,…"), help="names in summary.json, with points: quantities.clamp.force_y, errors.solver")
+    parser.add_argument("--columns", type=lambda text: named(text.split(",")), default=COLUMNS, metavar=(
+        "NAME,…"), help="figures, also NAME.governing and NAME.governing.time of the whole run, and entries of summary.json: errors.solver")
     parser.add_argument("--csv", action="store_true", help="as CSV with all digits; error bars are columns NAME.bar")
     arguments = parser.parse_args()
     found, failed = {}, False

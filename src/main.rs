@@ -50,6 +50,9 @@ enum Command {
     Solvers,
     /// Print the reference of all keys of a scene, in Markdown.
     Keys {
+        /// The figures of a run, as a table.
+        #[arg(long, conflicts_with = "schema")]
+        figures: bool,
         /// As a JSON schema, for editors.
         #[arg(long)]
         schema: bool,
@@ -83,7 +86,7 @@ fn main() -> ExitCode {
         Command::Figures(arguments) => command::script("figures", &arguments),
         Command::Report(arguments) => command::script("report", &arguments),
         Command::Solvers => command::solvers(),
-        Command::Keys { schema } => command::keys(schema),
+        Command::Keys { schema, figures } => command::keys(schema, figures),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),
         Command::Mesh { scenes } => command::mesh(&scenes),
     };

@@ -7,7 +7,7 @@ use signorini::{
     interrupt::Signal,
     mesh::{Mesh, Order},
     petsc::Session,
-    problem::{Bar, Dimension, locks},
+    problem::{Bar, locks},
     scene::{Scene, Stepping},
 };
 
@@ -204,9 +204,9 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     let reasons = reasons.chain(limit).chain(missing);
     let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
-    let quantities = task.problem.quantities();
-    let at_probe =
-        |bar: &&Bar| bar.dimension == Dimension::Stress && quantities.contains(&bar.name);
+    let probes: Vec<_> =
+        scene.probes.iter().map(|probe| format!("{}.von_mises", probe.name)).collect();
+    let at_probe = |bar: &&Bar| probes.contains(&bar.name);
     let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {
         format!(" (stresses at probes: of {:.1e} {})", bar.scale, scene.units.stress)
     });

@@ -6,7 +6,7 @@ use signorini::{
     estimate::INSTANTS,
     mesh::{Mesh, extent},
     model::{Material, Plane},
-    output::terminal::{self, say},
+    output::terminal::{self, plain, say},
     problem::{Collapse, DiscreteProblem},
     scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units, rounded},
 };
@@ -41,7 +41,7 @@ fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
         "{} vertices, {} triangles, up to {} {length} wide, angles from {:.0}°",
         mesh.nodes.len(),
         mesh.triangles.len(),
-        short(extent(&mesh.nodes)),
+        plain(extent(&mesh.nodes), 5),
         mesh.smallest_angle().0
     )
 }
@@ -53,9 +53,9 @@ fn materials(scene: &Scene) -> Vec<String> {
         let plane = if material.plane == Plane::Strain { "plane strain" } else { "plane stress" };
         let stress = &scene.units.stress;
         let mut words =
-            format!("E = {} {stress}, ν = {}, {plane}", short(material.young), material.poisson);
+            format!("E = {} {stress}, ν = {}, {plane}", plain(material.young, 5), material.poisson);
         if material.density > 0.0 {
-            words += &format!(", ρ = {}", short(material.density));
+            words += &format!(", ρ = {}", plain(material.density, 5));
         }
         match name {
             "" => row("material", words),
@@ -89,7 +89,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
             ("  boundary", format!("  {name}")),
             ("conditions", conditions),
             ("edges", edges.len().to_string()),
-            (&*measure, short(length)),
+            (&*measure, plain(length, 5)),
             ("outward normal", normal),
         ]
     };
@@ -131,7 +131,7 @@ fn conditions(
                     (low.min(gap), high.max(gap))
                 });
             let along = if gap.normal.is_some() { " along its own normal" } else { "" };
-            format!("gap from {} to {} {unit}{along}", short(least), short(most))
+            format!("gap from {} to {} {unit}{along}", plain(least, 5), plain(most, 5))
         }
     };
     boundary.conditions.iter().map(in_words).collect::<Vec<_>>().join(", ")
@@ -149,15 +149,6 @@ fn unknowns(problem: &DiscreteProblem) -> String {
     format!("{} displacements, {damage} of the damage; {contact} nodes of Γ_C", 2 * nodes)
 }
 
-/// A number as text with five digits.
-pub(super) fn short(value: f64) -> String {
-    let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(value);
-    match rounded.abs() {
-        size if size == 0.0 || (1e-3..1e7).contains(&size) => rounded.to_string(),
-        _ => format!("{rounded:e}"),
-    }
-}
-
 /// The resultants of the loads at the start and at the end.
 fn loads(problem: &DiscreteProblem) -> Vec<String> {
     let Units { length, force, .. } = &problem.scene().units;
@@ -165,7 +156,7 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
         let load = problem.load(t);
         let at_points = || load.chunks_exact(2).zip(&problem.body.nodes.points);
         let sum = |part: fn(&[f64], &[f64; 2]) -> f64| {
-            short(at_points().map(|(f, point)| part(f, point)).sum::<f64>() + 0.0)
+            plain(at_points().map(|(f, point)| part(f, point)).sum::<f64>() + 0.0, 5)
         };
         let [x, y] = [sum(|f, _| f[0]), sum(|f, _| f[1])];
         let moment = sum(|f, [x, y]| x * f[1] - y * f[0]);

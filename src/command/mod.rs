@@ -9,7 +9,7 @@
 mod accuracy;
 mod check;
 mod checkpoint;
-mod extremes;
+mod figures;
 mod new;
 mod profile;
 mod provenance;
@@ -33,7 +33,8 @@ use signorini::{
     interrupt::{Signal, received},
     mesh::{self, Kink, Mesh, MeshError, Order},
     output::terminal::say,
-    scene::{Boundary, Condition, MeshSource, SCHEMA, Scene},
+    problem::{Figure, Figures},
+    scene::{Boundary, Condition, MeshSource, SCHEMA, Scene, Units},
 };
 use std::{
     collections::{BTreeSet, HashSet},
@@ -281,9 +282,18 @@ fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, Failure> {
 /// The reference of all keys of a scene. scripts/keys.py makes it from their schema.
 const KEYS: &str = include_str!("../../geo/KEYS.md");
 
-/// `signorini keys [--schema]`.
-pub fn keys(as_schema: bool) -> Result<(), Failure> {
-    say(if as_schema { SCHEMA } else { KEYS }.trim_end());
+/// `signorini keys [--schema | --figures]`.
+pub fn keys(as_schema: bool, of_figures: bool) -> Result<(), Failure> {
+    match of_figures {
+        true => {
+            let row = |of: &Figure| {
+                let unit = of.dimension.unit(&Units::default());
+                format!("| `{}` | {} | {unit} |", of.name, of.label)
+            };
+            say(&Figures::of_any_scene().iter().map(row).collect::<Vec<_>>().join("\n"));
+        }
+        false => say(if as_schema { SCHEMA } else { KEYS }.trim_end()),
+    }
     Ok(())
 }
 

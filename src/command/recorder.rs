@@ -3,11 +3,14 @@
 use super::{
     accuracy,
     checkpoint::{self, Checkpoint, Recorded},
+    figures::LastFigures,
     profile, screen,
     summary::summary,
     task::Task,
 };
+use serde_json::json;
 use signorini::{
+    estimate::Extremes,
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::received,
     memory,
@@ -16,10 +19,9 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
-    problem::DiscreteProblem,
     scene::{APART, Stepping, rounded},
 };
-use std::time::Instant;
+use std::{path::Path, time::Instant};
 
 /// The approximate number of frames if the scene has no `output.every`.
 const FRAMES: usize = 20;
@@ -33,6 +35,8 @@ pub(super) struct Recorder<'a> {
     bar: Option<Progress>,
     /// `history.csv`; only the first rank writes it.
     history: Table,
+    /// The numbers of the figures that a [`StepRecord`] does not have: the columns after it.
+    added: Vec<usize>,
     last: Option<Step>,
     /// The time of all accepted steps after n = 0, s.
     stepping: f64,
@@ -46,10 +50,15 @@ impl<'a> Recorder<'a> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
         let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
         let saved = Instant::now();
-        let more = [columns(&task.problem), vec!["seconds".to_owned()]].concat();
+        let of_record = json!(StepRecord::default());
+        let figures = task.problem.figures.iter().enumerate();
+        let added = figures.filter(|(_, of)| of_record.get(&of.name).is_none());
+        let added = Vec::from_iter(added.map(|(number, _)| number));
+        let more = added.iter().map(|&number| task.problem.figures[number].name.as_str());
+        let more = Vec::from_iter(more.chain(["seconds"]));
         let history = Table::new(task.folder.join("history.csv"), &StepRecord::default(), &more)?;
         let (last, stepping) = Default::default();
-        Ok(Self { task, fields, bar, history, last, stepping, saved })
+        Ok(Self { task, fields, bar, history, added, last, stepping, saved })
     }
 
     /// Continues from a checkpoint and shows its time.
@@ -125,11 +134,11 @@ impl<'a> Recorder<'a> {
         let written = self.task.phases.time("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
             self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
-            let contact = self.task.problem.contact_figures(&step.state);
             let row = match comm.is_root() {
                 true => {
-                    let seconds = step.record.seconds;
-                    self.history.add(&[(&step.record, &step.quantities, contact, seconds)])
+                    let added = self.added.iter().map(|&number| step.figures[number].value);
+                    let added = Vec::from_iter(added.chain([step.record.seconds]));
+                    self.history.add(&[(&step.record, added)])
                 }
                 false => Ok(()),
             };
@@ -154,17 +163,15 @@ impl<'a> Recorder<'a> {
             _ => Ok(()),
         };
         let written = written.and(task.phases.time("output", || self.fields.complete()));
-        let extremes = last
-            .as_ref()
-            .map(|step| self.fields.extremes(&task.problem, &step.state, &task.measured));
-        let (written, extremes) = match extremes.transpose() {
-            Ok(extremes) => (written, extremes),
-            Err(error) => (written.and(Err(error)), None),
-        };
-        let quantities = last.iter().flat_map(|step| {
-            [&step.quantities[..], &task.problem.contact_figures(&step.state)].concat()
+        let problem = &task.problem;
+        let extremes = last.iter().map(|step| {
+            Extremes::of(problem, &step.state, &step.figures, &task.measured)
+                .map_err(|error| OutputError::new(Path::new("the extreme stresses"), error))
         });
-        let quantities: Vec<_> = columns(&task.problem).into_iter().zip(quantities).collect();
+        let (written, extremes) = match extremes.collect::<Result<Vec<_>, _>>() {
+            Ok(extremes) => (written, extremes.concat()),
+            Err(error) => (written.and(Err(error)), Vec::new()),
+        };
         let outcome = result.as_ref().ok();
         let mut notes = notes(task, outcome);
         let warnings = notes.len();
@@ -177,16 +184,15 @@ impl<'a> Recorder<'a> {
         let Some(bar) = &self.bar else { return written };
 
         let record = last.as_ref().map(|step| step.record);
-        let wall = task.started.elapsed().as_secs_f64();
-        let (extremes, result) = (extremes.as_ref(), result.as_ref());
-        if record.is_some() {
-            let summary =
-                summary(task, record, &quantities, extremes, result, &notes, [wall, memory]);
+        let figures = last.as_ref().map(|step| LastFigures::new(task, step, &extremes, outcome));
+        let (wall, result) = (task.started.elapsed().as_secs_f64(), result.as_ref());
+        if let Some(figures) = &figures {
+            let summary = summary(task, record, &figures.all, result, &notes, [wall, memory]);
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
         }
         let shown = if task.profile { &notes } else { &notes[..warnings] };
-        let mut lines = screen::conclusion(task, record, extremes, &quantities, result, shown);
+        let mut lines = screen::conclusion(task, record, figures.as_ref(), result, shown);
         if task.profile {
             let steps = record.map_or(0, |record| record.step);
             lines.extend(profile::lines(task.phases, wall, steps, self.stepping));
@@ -219,11 +225,6 @@ impl Observer for Recorder<'_> {
         self.saved = Instant::now();
         Ok(())
     }
-}
-
-/// The columns of `history.csv` between the record of a step and its seconds.
-fn columns(problem: &DiscreteProblem) -> Vec<String> {
-    [problem.quantities(), problem.contact_columns()].concat()
 }
 
 /// The notes on a run, except remarks. Collective.

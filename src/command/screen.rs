@@ -1,16 +1,14 @@
 //! The output of a run at the terminal: its task, a progress bar, and the result in a few lines.
 
-use super::{check::short, extremes, task::Task};
+use super::{figures::LastFigures, task::Task};
 use signorini::{
-    estimate::{Adapted, Extremes},
+    estimate::Adapted,
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
-    mesh::Mesh,
-    output::terminal::{Progress, say, with_bar},
+    output::terminal::{Progress, plain, say, with_bar},
     problem::Collapse,
-    scene::{Probe, Scheme, Stepping, TimeGrid, Units, rounded},
+    scene::{Scheme, Stepping, TimeGrid, rounded},
 };
 use std::{
-    collections::BTreeMap,
     io::{self, Write},
     num::NonZero,
     thread,
@@ -84,7 +82,7 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     let message = format!(
         "step {}  t = {}  min ζ = {:.6}  active {}  iterations {}",
         record.step,
-        short(record.time),
+        plain(record.time, 5),
         record.zeta_min,
         record.active_nodes,
         record.iterations
@@ -92,51 +90,32 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     bar.show((LENGTH as f64 * record.time / end) as u64, message);
 }
 
-/// The closing lines of a run: its end, and the quantities of its last accepted state. `last` is `None` if the
-/// first solve failed.
+/// The closing lines of a run: its end, and the figures of its last accepted state. `last` is `None` if the first solve failed.
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
-    extremes: Option<&Extremes>,
-    quantities: &[(String, f64)],
+    figures: Option<&LastFigures>,
     result: Result<&Outcome, &RunError>,
     notes: &[String],
 ) -> Vec<String> {
     let notes = notes.iter().map(|note| row("note", note.clone()));
     let end = row("end", ending(task.problem.collapse, last, result));
     let outcome = result.ok();
-    let Some(last) = last else { return [end].into_iter().chain(notes).collect() };
-    let shown = Shown::new(task, outcome);
-    let figure = |value: f64, name: &str| shown.figure(value, name, 6);
-    let zeta = |value: f64, name: &str| match (shown.bar("zeta_min"), shown.bar("zeta_mean")) {
-        (None, None) => format!("{value:.*}", shown.digits(6)),
-        _ => figure(value, name),
+    let (Some(last), Some(figures)) = (last, figures) else {
+        return [end].into_iter().chain(notes).collect();
     };
-    let damage = match (last.zeta_min, last.zeta_mean) {
-        (1.0, _) => "none".to_owned(),
-        (min, mean) => {
-            format!("min ζ {}, mean ζ {}", zeta(min, "zeta_min"), zeta(mean, "zeta_mean"))
-        }
-    };
-    let units = &task.problem.scene().units;
-    let (length, force) = (&units.length, &units.force);
-    let displacement = figure(last.displacement_max, "displacement_max");
-    let mut lines = vec![
-        end,
-        row("damage", damage),
-        row("displacement", format!("largest {displacement} {length}")),
-        row("work", format!("{} {}", figure(last.work, "work"), units.work())),
-    ];
-    lines.extend(extremes.into_iter().flat_map(|of| extremes::stresses(of, units, &shown)));
-    if task.contact_nodes > 0 {
-        let (active, nodes) = (last.active_nodes, task.contact_nodes);
-        let sum = figure(last.contact_force, "contact_force");
-        let contact = format!("{active} of {nodes} nodes active, force {sum} {force}/{length}");
-        lines.push(row("contact", contact));
-    }
-    lines.extend(extremes.into_iter().flat_map(|of| extremes::contact(of, units, &shown)));
-    lines.extend(supports(task, quantities, &shown));
-    lines.extend(probes(task, quantities, &shown));
+    let mut lines = vec![end, row("damage", damage(task, figures, outcome))];
+    lines.push(row("displacement", format!("largest {}", figures.full_text("displacement_max"))));
+    lines.push(row("work", figures.full_text("work")));
+    lines.extend(stresses(task, figures));
+    lines.extend(contact(task, last, figures));
+    lines.extend(task.problem.supports.names.iter().map(|name| support(name, figures)));
+    lines.extend(task.problem.scene().probes.iter().map(|of| probe(task, &of.name, figures)));
+    let governing = figures.governing().enumerate().map(|(i, (label, value, time))| {
+        let name = if i == 0 { "in the run" } else { "" };
+        row(name, format!("{label} {value} (t = {})", rounded(time)))
+    });
+    lines.extend(governing);
     if let Some(outcome) = outcome {
         let names = ["errors", "", "", ""].into_iter();
         let errors = names.zip(outcome.errors.lines(outcome.stopped.as_ref()));
@@ -148,90 +127,97 @@ pub fn conclusion(
     lines
 }
 
-/// How figures are shown.
-pub(super) struct Shown<'a> {
-    bars: Option<&'a BTreeMap<String, f64>>,
-    /// Whether the errors were measured.
-    is_measured: bool,
-    /// The estimated error of u from the mesh, relative, in the energy norm: the stresses are hardly more exact.
-    error: f64,
-    pub(super) mesh: &'a Mesh,
-}
-
-impl<'a> Shown<'a> {
-    fn new(task: &'a Task, outcome: Option<&'a Outcome>) -> Self {
-        let measured = &task.measured;
-        let is_measured =
-            task.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
-        let mesh = task.problem.mesh();
-        let errors = outcome.map(|of| &of.errors);
-        let error = errors.map_or(0.0, |errors| errors.displacement_mesh);
-        Self { bars: errors.map(|errors| &errors.figures), is_measured, error, mesh }
-    }
-
-    fn bar(&self, name: &str) -> Option<f64> {
-        self.bars?.get(name).copied()
-    }
-
-    /// The decimals of a figure without a bar: `usual` ones, or two if the measurement of the errors gave none for it.
-    fn digits(&self, usual: usize) -> usize {
-        if self.is_measured { 2 } else { usual }
-    }
-
-    /// A figure with its bar or, without one, with its [`Shown::digits`].
-    pub(super) fn figure(&self, value: f64, name: &str, usual: usize) -> String {
-        match self.bar(name) {
-            None => format!("{value:.*e}", self.digits(usual)),
-            bar => with_bar(value, bar),
-        }
-    }
-
-    /// An extreme with its bar or, without one, with the decimals that the estimated error leaves, at most four.
-    pub(super) fn extreme(&self, value: f64, name: &str) -> String {
-        self.figure(value, name, (-self.error.log10()).ceil().clamp(1.0, 4.0) as usize)
-    }
-}
-
-/// Per support: a line with its resultants and their error bars.
-fn supports(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<String> {
-    let Units { length, force, .. } = &task.problem.scene().units;
-    // Resultants come first, three for each support.
-    let line = |(name, of): (&String, &[(String, f64)])| {
-        let figure = |i: usize, part: &str| shown.figure(of[i].1, &format!("{name}.{part}"), 4);
-        let [x, y, moment] = [figure(0, "force_x"), figure(1, "force_y"), figure(2, "moment")];
-        let [start, end, at] = ["contact_start_x", "contact_end_x", "acts_at_x"]
-            .map(|of| extremes::place(quantities, &format!("{name}.{of}"), shown));
-        let contact = match (start, end, at) {
-            (Some(start), Some(end), Some(at)) => {
-                format!(" at {at}, contact from {start} to {end}")
-            }
-            _ => String::new(),
-        };
-        let resultant = format!("force ({x}, {y}) {force}/{length}{contact}");
-        row("support", format!("{name}: {resultant}, moment {moment} {force}"))
+/// The damage of the last state.
+fn damage(task: &Task, figures: &LastFigures, outcome: Option<&Outcome>) -> String {
+    let state = match figures.value("zeta_min") {
+        1.0 => "none".to_owned(),
+        _ => format!("min ζ {}, mean ζ {}", figures.text("zeta_min"), figures.text("zeta_mean")),
     };
-    task.problem.supports.names.iter().zip(quantities.chunks_exact(3)).map(line).collect()
+    match outcome.and_then(|outcome| outcome.stopped) {
+        Some(_) => format!("min ζ reached ζ_* = {}; before: {state}", task.problem.threshold()),
+        None => state,
+    }
 }
 
-/// Per probe: a line with its displacement, von Mises stress and damage, and their error bars.
-fn probes(task: &Task, quantities: &[(String, f64)], shown: &Shown) -> Vec<String> {
-    let scene = task.problem.scene();
-    let Units { length, stress, .. } = &scene.units;
-    let line = |probe: &Probe| {
-        let figure = |part: &str| {
-            let name = format!("{}.{part}", probe.name);
-            let value = quantities.iter().find(|(other, _)| *other == name);
-            value.map_or_else(String::new, |(_, value)| shown.figure(*value, &name, 4))
-        };
-        let [x, y, von_mises] = ["u_x", "u_y", "von_mises"].map(figure);
-        let zeta = match scene.damage {
-            Some(_) => format!(", ζ {}", figure("zeta")),
-            None => String::new(),
-        };
-        let values = format!("u ({x}, {y}) {length}, von Mises {von_mises} {stress}{zeta}");
-        row("probe", format!("{}: {values}", probe.name))
+/// The lines of the extreme stresses of the body, and a line for each of several materials.
+fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
+    if figures.value("von_mises_max") == 0.0 {
+        return Vec::new();
+    }
+    let [von_mises, most, least] =
+        ["von_mises_max", "principal_max", "principal_min"].map(|name| figures.full_text(name));
+    let grows = match figures.singular("von_mises_max") {
+        Some(place) => format!(" at {place}, grows as the mesh is refined"),
+        None => String::new(),
     };
-    scene.probes.iter().map(line).collect()
+    let of_material = |name: &str| {
+        let [von_mises, most, least] = ["von_mises_max", "principal_max", "principal_min"]
+            .map(|kind| figures.full_text(&format!("{name}.{kind}")));
+        row("", format!("{name}: von Mises {von_mises}, σ₁ {most}, σ₂ {least}"))
+    };
+    let materials = task.problem.materials();
+    let several = materials.clone().count() > 1;
+    [
+        row("stress", format!("largest von Mises {von_mises}{grows}")),
+        row("", format!("largest σ₁ {most}")),
+        row("", format!("smallest σ₂ {least}")),
+    ]
+    .into_iter()
+    .chain(materials.filter(|_| several).map(of_material))
+    .collect()
+}
+
+/// The lines of contact, of all of it and of each of several foundations.
+fn contact(task: &Task, last: StepRecord, figures: &LastFigures) -> Vec<String> {
+    let foundations = task.problem.foundations();
+    if foundations.is_empty() {
+        return Vec::new();
+    }
+    let (active, nodes) = (last.active_nodes, task.contact_nodes);
+    let force = figures.full_text("contact_force");
+    let several = if foundations.len() > 1 { foundations } else { &[] };
+    let of = |foundation: Option<&String>| {
+        let [prefix, name] = match foundation {
+            Some(name) => [format!("{name}."), format!("{name}: ")],
+            None => [String::new(), String::new()],
+        };
+        let [length, pressure] =
+            ["contact_length", "pressure_max"].map(|of| format!("{prefix}{of}"));
+        let largest = match figures.value(&pressure) {
+            0.0 => String::new(),
+            _ => format!(", largest pressure {}", figures.full_text(&pressure)),
+        };
+        row("", format!("{name}length {}{largest}", figures.full_text(&length)))
+    };
+    let all = [None].into_iter().chain(several.iter().map(Some)).map(of);
+    let first = row("contact", format!("{active} of {nodes} nodes active, force {force}"));
+    [first].into_iter().filter(|_| nodes > 0).chain(all).collect()
+}
+
+/// The line of a support with its resultants.
+fn support(name: &str, figures: &LastFigures) -> String {
+    let [x, y] = ["force_x", "force_y"].map(|of| figures.text(&format!("{name}.{of}")));
+    let unit = figures.get(&format!("{name}.force_x")).map_or("", |of| &*of.unit);
+    let places = ["contact_start", "contact_end", "acts_at"]
+        .map(|of| figures.place(&format!("{name}.{of}")));
+    let contact = match places {
+        [Some(start), Some(end), Some(at)] => format!(" at {at}, contact from {start} to {end}"),
+        _ => String::new(),
+    };
+    let moment = figures.full_text(&format!("{name}.moment"));
+    row("support", format!("{name}: force ({x}, {y}) {unit}{contact}, moment {moment}"))
+}
+
+/// The line of a probe with its displacement, von Mises stress and damage.
+fn probe(task: &Task, name: &str, figures: &LastFigures) -> String {
+    let [x, y, zeta] = ["u_x", "u_y", "zeta"].map(|of| figures.text(&format!("{name}.{of}")));
+    let unit = &task.problem.scene().units.length;
+    let von_mises = figures.full_text(&format!("{name}.von_mises"));
+    let zeta = match task.problem.scene().damage {
+        Some(_) => format!(", ζ {zeta}"),
+        None => String::new(),
+    };
+    row("probe", format!("{name}: u ({x}, {y}) {unit}, von Mises {von_mises}{zeta}"))
 }
 
 pub fn row(name: &str, value: String) -> String {

@@ -1,9 +1,8 @@
 //! `summary.json`: what a run has found, and what it cost.
 
-use super::{accuracy::accuracy_note, provenance::provenance, task::Task};
-use serde_json::{Value, json};
+use super::{accuracy::accuracy_note, figures::LastFigure, provenance::provenance, task::Task};
+use serde_json::{Map, Value, json};
 use signorini::{
-    estimate::Extremes,
     evolution::{Outcome, RunError, StepRecord},
     problem::DiscreteProblem,
 };
@@ -13,8 +12,7 @@ use std::collections::BTreeMap;
 pub(super) fn summary(
     task: &Task,
     last: Option<StepRecord>,
-    quantities: &[(String, f64)],
-    extremes: Option<&Extremes>,
+    figures: &[LastFigure],
     result: Result<&Outcome, &RunError>,
     notes: &[String],
     [wall, memory]: [f64; 2],
@@ -37,14 +35,9 @@ pub(super) fn summary(
         // Accepted steps after t = 0, and the last time, s.
         "steps": steps,
         "end_time": last.map(|record| record.time),
-        // As in history.csv.
-        "zeta_min": last.map(|record| record.zeta_min),
-        "zeta_mean": last.map(|record| record.zeta_mean),
-        "displacement_max": last.map(|record| record.displacement_max),
-        "work": last.map(|record| record.work),
-        "contact_force": last.map(|record| record.contact_force),
         "active_nodes": last.map(|record| record.active_nodes),
-        "quantities": quantities.iter().cloned().collect::<BTreeMap<_, _>>(),
+        // By their names, in their order.
+        "figures": figures.iter().map(|of| (of.figure.name.clone(), json!(of))).collect::<Map<_, _>>(),
         // The maxima over all steps.
         "kkt": outcome.map(|outcome| outcome.kkt).or(last.map(|record| record.kkt())),
         // Estimated relative errors of the last state.
@@ -63,21 +56,9 @@ pub(super) fn summary(
     if let Err(error) = result {
         summary["error"] = json!(error.to_string());
     }
-    extremes.iter().for_each(|extremes| add_extremes(&mut summary, extremes));
     summary["peak_megabytes"] = json!(memory);
     add_stop(&mut summary, problem, outcome);
     summary
-}
-
-/// Adds to the summary the extreme stresses and pressures with their places, and the lengths of contact, m.
-fn add_extremes(summary: &mut Value, extremes: &Extremes) {
-    for extreme in &extremes.of_points {
-        summary[&extreme.name] = json!(extreme.value);
-        summary["extremes"][&extreme.name] = json!(extreme);
-    }
-    for (name, length) in &extremes.contact_lengths {
-        summary[name] = json!(length);
-    }
 }
 
 /// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it

@@ -170,8 +170,7 @@ fn with_passing_loads(
     accuracy: f64,
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-    let names = problem.figure_names();
-    let names = Vec::from_iter(names.iter().map(String::as_str));
+    let names = Vec::from_iter(problem.figures.iter().map(|figure| &*figure.name));
     scene.check_figures(&names).map_err(SetupError::from)?;
     if let Some(Collapse { time, .. }) = problem.collapse_on_a_point() {
         return Err(AdaptError::Overturns { time });

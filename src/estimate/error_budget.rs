@@ -7,7 +7,6 @@ use crate::{
     problem::{DiscreteProblem, State},
 };
 use nalgebra::DVector;
-use std::collections::BTreeMap;
 
 impl ErrorBudget {
     /// The budget of the last accepted state, from the error of its ζ by the `steps` and its error bar. Collective.
@@ -38,7 +37,6 @@ impl ErrorBudget {
             displacement_steps: error.map(caused),
             damage_steps: error.and_then(|error| problem.relative_to_damage(error, state)),
             solver: accuracy.displacement,
-            figures: BTreeMap::new(),
             can_be_damaged: problem.damage().is_some(),
             bars_of_steps: steps.as_ref().map(bars),
         }

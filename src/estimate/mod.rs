@@ -4,7 +4,7 @@
 //! refines meshes until the difference is within the required accuracy. There are three estimates:
 //!
 //! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
-//!   (the same strains give the [`NodalStress`] of pictures);
+//!   (the same strains give the [`NodalStress`](crate::problem::NodalStress) of pictures);
 //! - [`Measured`]: the error bar of each printed figure, measured by the same run on three meshes;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
@@ -16,9 +16,7 @@
 //! here changes the answer of a run.
 
 mod hierarchical;
-mod patches;
 mod recovery;
-mod stress;
 mod extremes;
 mod error_budget;
 mod adaptive;
@@ -26,19 +24,15 @@ mod adaptive;
 pub use adaptive::{AdaptError, Adapted, INSTANTS, Measured, adapted, measured_errors};
 pub use extremes::{Extreme, Extremes};
 pub use recovery::{EnergyError, RecoveredStrains};
-pub use stress::{NodalStress, Strained, principal};
 
 use crate::{
-    ROUNDING,
     evolution::{
         Callback, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError, RunState, Step,
         all_steps,
     },
-    fem::RigidMotion,
     petsc::{PetscError, Session},
-    problem::{Bar, DiscreteProblem, State},
+    problem::{Bar, DiscreteProblem},
 };
-use std::borrow::Cow;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
@@ -96,68 +90,42 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
     let (last, most) = (&outcome.last, outcome.most_displaced());
     let unloaded = last.record.displacement_max < UNLOADED * most.record.displacement_max;
     let state = if unloaded { &most.state } else { &last.state };
-    problem.energy_error(&state.zeta, &strained(problem, state).u)
-}
-
-/// `state`, without displacements if the body only moves rigidly: its strains are rounding. Collective.
-fn strained<'a>(problem: &DiscreteProblem, state: &'a State) -> Cow<'a, State> {
-    let motion = RigidMotion::nearest(&problem.body, &state.u);
-    let [rigid, rest] = motion.max_norms(&problem.body, &state.u);
-    match rest > ROUNDING * rigid {
-        true => Cow::Borrowed(state),
-        false => Cow::Owned(State { u: vec![0.0; state.u.len()], ..state.clone() }),
-    }
+    problem.energy_error(&state.zeta, &problem.strained(state).u)
 }
 
 impl Outcome {
     /// Sets the error bars: the `measured` errors of the mesh plus the errors of the time steps. A run that stopped at
     /// ζ_* has the bar of this time alone, because another mesh stops at another time. There are none if the run has too
     /// few steps for an estimate. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn set_bars(
-        &mut self,
-        problem: &DiscreteProblem,
-        measured: &Measured,
-    ) -> Result<(), PetscError> {
+    pub fn set_bars(&mut self, problem: &DiscreteProblem, measured: &Measured) {
         let unknown = problem.damage().is_some() && self.errors.bars_of_steps.is_none();
         if let Some(stop) = &mut self.stopped {
             stop.from_mesh = measured.stop;
-            return Ok(());
+            return;
         }
         self.errors.damage_mesh = measured.damage;
         if unknown || measured.bars.is_empty() {
-            return Ok(());
+            return;
         }
         self.bars = measured.bars.clone();
-        let (state, nodal) = (&self.last.state, NodalStress::new(problem));
-        let extremes = Extremes::of(problem, state, &nodal, measured)?;
-        let now = self.set_scales(problem, &extremes, measured);
+        let now = self.set_scales(problem, measured);
         let of_steps = self.errors.bars_of_steps.unwrap_or_default();
         problem.add_step_errors(&mut self.bars, &now, of_steps);
-        self.set_bars_of_extremes(&extremes);
-        Ok(())
+        problem.join_bars(&mut self.bars, &self.last.figures);
     }
 
     /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end
     /// in a less damaged state: their relative errors count. Returns the scales of the bars in the last state. An extreme
     /// that grows is no scale.
-    fn set_scales(
-        &mut self,
-        problem: &DiscreteProblem,
-        extremes: &Extremes,
-        measured: &Measured,
-    ) -> Vec<f64> {
-        let of_extremes = Vec::from_iter(extremes.values().into_iter().map(f64::abs));
-        let (names, unsettled) = (problem.figure_names(), &measured.unsettled);
+    fn set_scales(&mut self, problem: &DiscreteProblem, measured: &Measured) -> Vec<f64> {
         let scales = |sizes: &[f64], forces: f64| {
-            let scales = problem.figure_scales([sizes, &of_extremes], unsettled, 0.0, forces);
-            let of = |bar: &Bar| names.iter().position(|name| *name == bar.name);
-            Vec::from_iter(self.bars.iter().map(|bar| of(bar).map_or(0.0, |i| scales[i])))
+            let scales = problem.figure_scales(sizes, &measured.unsettled, 0.0, forces);
+            let of = |bar: &Bar| problem.figures.number(&bar.name).map_or(0.0, |i| scales[i]);
+            Vec::from_iter(self.bars.iter().map(of))
         };
-        let largest = scales(&self.sizes, self.last.forces);
-        let now = scales(&problem.figure_sizes(&self.last.figures()), 0.0);
+        let largest = scales(&self.sizes(problem), self.last.forces);
+        let last = self.last.figures.iter().map(|of| of.value);
+        let now = scales(&problem.figures.sizes(last), 0.0);
         for (bar, scale) in self.bars.iter_mut().zip(largest) {
             if scale > bar.scale && bar.scale > 0.0 {
                 bar.bar *= scale / bar.scale;
@@ -165,15 +133,5 @@ impl Outcome {
             }
         }
         now
-    }
-
-    /// Sets the bars of the extremes of the whole, and enters the bars in the errors, except those of extremes that the mesh
-    /// does not determine.
-    fn set_bars_of_extremes(&mut self, extremes: &Extremes) {
-        extremes.join(&mut self.bars);
-        let unknown =
-            |bar: &&Bar| extremes.of_points.iter().any(|of| of.name == bar.name && !of.is_known());
-        let known = self.bars.iter().filter(|bar| !unknown(bar));
-        self.errors.figures = known.map(|bar| (bar.name.clone(), bar.bar)).collect();
     }
 }

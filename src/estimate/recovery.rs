@@ -1,11 +1,8 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
-use super::{
-    hierarchical::{coefficients, mass},
-    patches::{ENTRIES, Fit, Patches, monomials},
-};
+use super::hierarchical::{coefficients, mass};
 use crate::{
-    fem::{Body, Elasticity, for_elements},
+    fem::{Body, Elasticity, Fit, Patches, for_elements, monomials},
     petsc::PetscError,
 };
 use nalgebra::{Matrix6x3, Vector3};
@@ -37,7 +34,7 @@ pub struct RecoveredStrains<'a> {
     strains: Vec<Vector3<f64>>,
     per_triangle: usize,
     /// Per material: the fits of the vertices.
-    pub(super) fits: Vec<Vec<Fit>>,
+    pub(super) fits: Vec<Vec<Option<Fit>>>,
 }
 
 impl<'a> RecoveredStrains<'a> {
@@ -56,8 +53,7 @@ impl<'a> RecoveredStrains<'a> {
         body: &'a Body,
         strains: Vec<Vector3<f64>>,
     ) -> Result<Self, PetscError> {
-        let mut update = |fields: &mut [f64]| body.vertices.partition.update(fields, ENTRIES);
-        let fits = patches.fits(&strains, &mut update)?;
+        let fits = patches.fits(&strains, Some(&body.vertices.partition))?;
         Ok(Self { body, strains, per_triangle: patches.per_triangle, fits })
     }
 
@@ -91,7 +87,8 @@ impl<'a> RecoveredStrains<'a> {
         let at = |i: usize| body.mesh.nodes[triangle[i]];
         let recovered = |i: usize, [x, y]: [f64; 2]| {
             let [vx, vy] = at(i);
-            fits[triangle[i]].transpose() * monomials([x - vx, y - vy])
+            let fit = fits[triangle[i]].as_ref();
+            fit.map_or_else(Vector3::zeros, |fit| fit.tr_mul(&monomials([x - vx, y - vy])))
         };
         let vertex = |i: usize| recovered(i, at(i)) - computed[i];
         let middle = |i: usize, j: usize| {

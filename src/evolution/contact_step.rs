@@ -193,10 +193,9 @@ impl<'a> ContactStep<'a> {
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = self.next.reference.total(u);
         let state = State { time, u, zeta: zeta.to_vec(), contact };
-        let (mut record, quantities) = phases.time("step record", || {
-            let record = StepRecord::new(problem, step, &state, &case.load, &report, &kkt);
-            (record, problem.quantities_in(&state, &unbalanced, rounding))
-        });
+        let (observation, figures) = phases
+            .time("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
+        let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);
         record.seconds = started.elapsed().as_secs_f64();
         if !(0.0..=MAX_DISPLACEMENT).contains(&record.displacement_max) {
             let source = StepFailure::TooLarge(record.displacement_max);
@@ -205,7 +204,8 @@ impl<'a> ContactStep<'a> {
         Ok(Step {
             state,
             record,
-            quantities,
+            figures,
+            governing: Vec::new(),
             forces,
             report,
             unconstrained,

@@ -2,7 +2,6 @@
 
 use super::Stop;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
 /// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps, and at ζ_*.
@@ -19,8 +18,6 @@ pub struct ErrorBudget {
     pub damage_steps: Option<f64>,
     /// The error of max |u| from the solver; infinite if the active nodes alone do not support the body.
     pub solver: f64,
-    /// Per name of a figure: its error bar from mesh and time steps, in its unit. Empty if they are not measured.
-    pub figures: BTreeMap<String, f64>,
     /// Can the material be damaged?
     #[serde(skip)]
     pub can_be_damaged: bool,

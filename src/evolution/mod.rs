@@ -48,7 +48,7 @@ pub use extrapolation::Extrapolation;
 pub(crate) use observer::Callback;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
-pub use state::{Step, StepRecord};
+pub use state::{GoverningValue, Step, StepRecord};
 pub use step_controller::AIM;
 pub(crate) use step_controller::StepController;
 

@@ -53,8 +53,6 @@ pub struct Outcome {
     /// The steps with the maximum stationarity residual and the maximum displacement before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
     most_displaced: Option<Rc<Step>>,
-    /// The maximum size of each figure in the run, except the extremes.
-    pub(crate) sizes: Vec<f64>,
 }
 
 /// The stop at ζ_*.
@@ -84,7 +82,8 @@ impl Outcome {
     /// The outcome of a run after its first solve, (27).
     pub(super) fn new(first: Step, problem: &DiscreteProblem) -> Self {
         let mut outcome = Self { last: first, ..Self::default() };
-        outcome.count_last(problem);
+        outcome.last.govern(problem, &[]);
+        outcome.count_last();
         outcome
     }
 
@@ -95,7 +94,14 @@ impl Outcome {
         self.most_displaced.as_ref().filter(larger).map_or(&self.last, Rc::as_ref)
     }
 
-    pub(super) fn accept(&mut self, step: Step, problem: &DiscreteProblem) {
+    /// The sizes of all figures in the run, from which their scales come.
+    pub(crate) fn sizes(&self, problem: &DiscreteProblem) -> Vec<f64> {
+        let governing = self.last.governing.iter();
+        problem.figures.sizes(governing.map(|of| of.map_or(0.0, |of| of.value)))
+    }
+
+    pub(super) fn accept(&mut self, mut step: Step, problem: &DiscreteProblem) {
+        step.govern(problem, &self.last.governing);
         let before = Rc::new(mem::replace(&mut self.last, step));
         let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {
             if kept.as_ref().is_none_or(|kept| of(&before.record) > of(&kept.record)) {
@@ -104,13 +110,10 @@ impl Outcome {
         };
         keep_larger(&mut self.least_accurate, |record| record.kkt_stationarity);
         keep_larger(&mut self.most_displaced, |record| record.displacement_max);
-        self.count_last(problem);
+        self.count_last();
     }
 
-    fn count_last(&mut self, problem: &DiscreteProblem) {
-        let sizes = problem.figure_sizes(&self.last.figures());
-        self.sizes.resize(sizes.len(), 0.0);
-        self.sizes.iter_mut().zip(sizes).for_each(|(most, size)| *most = most.max(size));
+    fn count_last(&mut self) {
         let Step { record, report, unconstrained, .. } = &self.last;
         self.kkt = self.kkt.max(&record.kkt());
         self.skipped_damage_solves += usize::from(self.last.skipped_damage_solve);

@@ -1,9 +1,10 @@
-//! A step: its fields and its quantities of interest.
+//! A step: its fields and its figures.
 
 use super::{DiscreteProblem, State};
 use crate::{
     contact::{ContactReport, Kkt},
     fem::{DamageCertificate, RigidMotion},
+    problem::{Figure, Observation, Value},
 };
 use serde::{Deserialize, Serialize};
 
@@ -12,10 +13,12 @@ use serde::{Deserialize, Serialize};
 pub struct Step {
     /// The fields.
     pub state: State,
-    /// A row of `history.csv`.
+    /// The first columns of a row of `history.csv`.
     pub record: StepRecord,
-    /// The rest of the row: [`DiscreteProblem::quantities`].
-    pub quantities: Vec<f64>,
+    /// The values of all figures, in the order of [`DiscreteProblem::figures`].
+    pub figures: Vec<Value>,
+    /// The governing value of each figure in all steps so far; `None` for places.
+    pub governing: Vec<Option<GoverningValue>>,
     /// The maximum Σ|·| of the loads and the internal forces so far, N per metre of thickness: the scale of resultants.
     pub forces: f64,
     /// The effort of the contact solve; not in archives.
@@ -27,7 +30,18 @@ pub struct Step {
     pub skipped_damage_solve: bool,
 }
 
-/// The quantities of interest of a step: a row of `history.csv`.
+/// The extreme of a figure over the steps of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GoverningValue {
+    /// The largest value, for components in modulus, or the least ζ and σ₂.
+    pub value: f64,
+    /// Its place, m, if it is found at one.
+    pub at: Option<[f64; 2]>,
+    /// The time of the first step that has it, s.
+    pub time: f64,
+}
+
+/// The first columns of a row of `history.csv`: the figures that every problem has, and the effort and accuracy of the step.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub struct StepRecord {
     /// n, 0 for the state at t = 0.
@@ -74,17 +88,15 @@ pub struct StepRecord {
 }
 
 impl Step {
-    /// The values of all figures, in the order of [`DiscreteProblem::bars`].
-    pub(crate) fn figures(&self) -> Vec<f64> {
-        let record = &self.record;
-        let of_record = [
-            record.work,
-            record.displacement_max,
-            record.contact_force,
-            record.zeta_min,
-            record.zeta_mean,
-        ];
-        [&of_record[..], &self.quantities].concat()
+    /// Sets the governing values from those of the step before; empty for the first one.
+    pub(super) fn govern(&mut self, problem: &DiscreteProblem, before: &[Option<GoverningValue>]) {
+        let governing = |(i, (figure, of)): (usize, (&Figure, &Value))| {
+            let (before, time) = (before.get(i).copied().flatten(), self.record.time);
+            let own = GoverningValue { value: of.value, at: of.at, time };
+            if figure.governs(of.value, before.map(|of| of.value)) { Some(own) } else { before }
+        };
+        let figures = problem.figures.iter().zip(&self.figures).enumerate();
+        self.governing = figures.map(governing).collect();
     }
 
     /// Sets the accuracy of ζ_n; `None` means that the damage solve was skipped, so ζ_n is exact.
@@ -97,30 +109,27 @@ impl Step {
 }
 
 impl StepRecord {
-    /// The record of the step n = `step` with the nodal loads `load`. Entries of the damage step are zero.
+    /// The record of the step n = `step`. Entries of the damage step are zero.
     pub(super) fn new(
         problem: &DiscreteProblem,
         step: usize,
         state: &State,
-        load: &[f64],
+        observation: &Observation,
         report: &ContactReport,
         kkt: &Kkt,
     ) -> Self {
-        let points = || state.contact.iter().filter(|point| point.active);
-        let mut active: Vec<usize> = points().map(|point| point.node).collect();
+        let points = state.contact.iter().filter(|point| point.active);
+        let mut active: Vec<usize> = points.map(|point| point.node).collect();
         active.dedup();
-        let partition = &problem.body.nodes.partition;
-        let comm = partition.comm();
         Self {
             step,
             time: state.time,
-            zeta_min: problem.body.vertices.partition.min_max(&state.zeta).0,
-            zeta_mean: problem.body.mean(&state.zeta),
-            displacement_max: partition.max_norm(&state.u),
-            work: partition.dot(load, &state.u, 2),
-            // An empty sum is -0.0.
-            contact_force: comm.total(points().map(|point| point.force).sum()) + 0.0,
-            active_nodes: comm.count(active.len()),
+            zeta_min: observation.zeta_min.value,
+            zeta_mean: observation.zeta_mean,
+            displacement_max: observation.displacement_max.value,
+            work: observation.work,
+            contact_force: observation.contact_force,
+            active_nodes: problem.body.nodes.partition.comm().count(active.len()),
             iterations: report.iterations,
             linear_iterations: report.linear_iterations,
             factorisations: report.factorisations,

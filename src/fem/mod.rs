@@ -22,6 +22,7 @@ mod damage;
 mod damage_certificate;
 mod loads;
 mod location;
+mod patches;
 
 pub use body::{Body, Nodes};
 pub(crate) use cells::for_elements;
@@ -36,6 +37,7 @@ pub(crate) use location::ON_SIDE;
 pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
+pub(crate) use patches::{Fit, Patches, monomials};
 pub use rigid_motion::{RigidMotion, resultant};
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;

@@ -230,11 +230,11 @@ impl Table {
     pub fn new(
         path: PathBuf,
         example: &impl Serialize,
-        more: &[String],
+        more: &[&str],
     ) -> Result<Self, OutputError> {
         let header = csv_text(true, [example]).and_then(|example| {
             let mut example = csv::Reader::from_reader(&example[..]);
-            let columns = example.headers()?.iter().chain(more.iter().map(String::as_str));
+            let columns = example.headers()?.iter().chain(more.iter().copied());
             csv_text(false, [columns.collect::<Vec<_>>()])
         });
         let header = header.map_err(|e| OutputError::new(&path, e))?;

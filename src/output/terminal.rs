@@ -43,6 +43,15 @@ pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     }
 }
 
+/// A number with at most this many significant digits: `0.0125`, `12.5`, or `1.25e-7`.
+pub fn plain(value: f64, digits: usize) -> String {
+    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
+    match rounded.abs() {
+        size if size == 0.0 || (1e-3..1e7).contains(&size) => rounded.to_string(),
+        _ => format!("{rounded:e}"),
+    }
+}
+
 /// A progress bar of `length` after indicatif's `template`. It is silent if standard error is no terminal.
 pub fn progress_bar(template: &str, length: u64) -> ProgressBar {
     let bar = ProgressBar::new(length);

@@ -9,11 +9,10 @@ use super::{
     write_whole,
 };
 use crate::{
-    estimate::{Extremes, Measured, NodalStress, principal},
     fem::Elements,
     model::von_mises,
     petsc::PetscError,
-    problem::{DiscreteProblem, State},
+    problem::{DiscreteProblem, NodalStress, State, principal, principal_direction},
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -71,7 +70,7 @@ impl FieldWriter {
     pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
         let comm = problem.body.nodes.partition.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
-        let stress = NodalStress::new(problem);
+        let stress = Arc::clone(problem.nodal_stress());
         let kind = match problem.body.elements() {
             Elements::Linear(_) => TRIANGLE,
             Elements::Quadratic(_) => QUADRATIC_TRIANGLE,
@@ -79,7 +78,7 @@ impl FieldWriter {
         Ok(Self {
             folder: folder.to_owned(),
             mesh: cells_text(&stress.places(), &stress.cells, kind).into(),
-            stress: stress.into(),
+            stress,
             pieces: (0..comm.size()).filter(|&rank| triangles[rank] > 0.0).collect(),
             list: list_of_frames(folder.join("fields.pvd")),
             pending: None,
@@ -162,20 +161,6 @@ impl FieldWriter {
         self.list.add(entry(state.time, &whole).as_bytes())
     }
 
-    /// The extremes of a state, with those that `measured` saw growing. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn extremes(
-        &self,
-        problem: &DiscreteProblem,
-        state: &State,
-        measured: &Measured,
-    ) -> Result<Extremes, OutputError> {
-        let extremes = Extremes::of(problem, state, &self.stress, measured);
-        extremes.map_err(|error| OutputError::new(Path::new("the largest stress"), error))
-    }
-
     /// Waits until the last frame is written.
     ///
     /// # Errors
@@ -245,9 +230,9 @@ fn point_data(
 fn stress_data(stresses: &[[f64; 4]]) -> [DataArray; 4] {
     let single = |value: f64| value as f32;
     let components = stresses.iter().flat_map(|stress| stress.map(single));
-    let principals = stresses.iter().flat_map(|stress| principal(*stress).0.map(single));
+    let principals = stresses.iter().flat_map(|stress| principal(*stress).map(single));
     let directions = stresses.iter().flat_map(|stress| {
-        let [x, y] = principal(*stress).1;
+        let [x, y] = principal_direction(*stress);
         [x, y, 0.0].map(single)
     });
     let von_mises = stresses.iter().map(|stress| single(von_mises(*stress)));

@@ -6,42 +6,42 @@
 //!   tip (Johnson, Contact Mechanics, 5.2), a the half length of contact. A bisection of the edges adds (E Δ/2π) ln 2.
 
 use super::{
-    ContactRow, DiscreteProblem, SEEN, Singular, State, contact_line::parts_from_open_nodes,
+    ContactRow, DiscreteProblem, SEEN, Singular, Value, contact_line::parts_from_open_nodes,
 };
 use std::f64::consts::{LN_2, TAU};
 
-/// The first and the last active node with the body on the left (on a closed part from its longest stretch without contact),
-/// the one with the largest pressure, and the point of the resultant's line of action that is nearest to the middle between
-/// the first and the last one.
-const PLACES: [&str; 4] = ["contact_start", "contact_end", "peak", "acts_at"];
+/// The figures of contact of Γ_C or of a foundation.
+pub(crate) struct ContactFigures {
+    /// The largest contact pressure, Pa, and the length of contact, m.
+    pub values: [Value; 2],
+    /// The coordinates, m, of the first and the last active node with the body on the left (on a closed part from its longest
+    /// stretch without contact), the one with the largest pressure, and the point of the resultant's line of action that is
+    /// nearest to the middle between the first and the last one. NaN without contact.
+    pub places: [f64; 8],
+}
 
 impl DiscreteProblem {
-    /// The names of the figures of contact of a step, `FOUNDATION.contact_length` and others.
-    pub fn contact_columns(&self) -> Vec<String> {
-        let mut names = vec!["contact_length".to_owned(), "pressure_max".to_owned()];
-        names.extend(PLACES.iter().flat_map(|of| ["x", "y"].map(|axis| format!("{of}_{axis}"))));
-        let of = |foundation| names.iter().map(move |name| format!("{foundation}.{name}"));
-        self.foundations.iter().flat_map(of).collect()
-    }
-
-    /// The values of [`Self::contact_columns`] in a state; places are NaN without contact. Collective.
-    pub fn contact_figures(&self, state: &State) -> Vec<f64> {
-        let (rows, _) = self.supports.contact.rows(&self.body, state);
-        let figures = |name: &String| {
-            let rows = rows_of(&rows, name);
-            let ordered = parts_from_open_nodes(rows).concat();
-            let mut active = ordered.iter().filter(|row| row.active == 1);
-            let peak = peak(rows).filter(|row| row.pressure > 0.0);
-            let first = active.next();
-            let at = |row: Option<&ContactRow>| row.map_or([f64::NAN; 2], |row| [row.x, row.y]);
-            let [start, end] = [first, active.next_back().or(first)].map(at);
-            let pressure = peak.map_or(0.0, |row| row.pressure);
-            let length = self.supports.contact.length(rows).0;
-            let middle = [0, 1].map(|k| 0.5 * (start[k] + end[k]));
-            let acts_at = point_of_action(rows, middle, self.tolerance);
-            [[length, pressure], start, end, at(peak), acts_at].into_iter().flatten()
-        };
-        self.foundations.iter().flat_map(figures).collect()
+    /// The figures of the contact at some `rows` of Γ_C.
+    pub(crate) fn contact_figures(&self, rows: &[ContactRow]) -> ContactFigures {
+        let ordered = parts_from_open_nodes(rows).concat();
+        let mut active = ordered.iter().filter(|row| row.active == 1);
+        let peak = rows.iter().max_by(|a, b| a.pressure.total_cmp(&b.pressure));
+        let first = active.next();
+        let place = |row: &ContactRow| [row.x, row.y];
+        let at = |row: Option<&ContactRow>| row.map_or([f64::NAN; 2], place);
+        let [start, end] = [first, active.next_back().or(first)].map(at);
+        let pressure = peak.map_or(0.0, |row| row.pressure);
+        let middle = [0, 1].map(|k| 0.5 * (start[k] + end[k]));
+        let acts_at = point_of_action(rows, middle, self.tolerance);
+        let of_peak = at(peak.filter(|row| row.pressure > 0.0));
+        let places = [start, end, of_peak, acts_at];
+        ContactFigures {
+            values: [
+                Value { value: pressure, at: peak.map(place) },
+                self.supports.contact.length(rows).0.into(),
+            ],
+            places: std::array::from_fn(|k| places[k / 2][k % 2]),
+        }
     }
 
     /// The peaks of the pressure by the `rows` of Γ_C that the mesh does not resolve, with the reason.
@@ -92,11 +92,6 @@ impl DiscreteProblem {
         let curvatures = others.filter_map(bend).map(|[bend, length]| bend / length);
         Some(own - 2.0 * length * curvatures.reduce(f64::max)?.max(0.0))
     }
-}
-
-/// The row with the largest pressure; `None` without rows.
-pub(crate) fn peak(rows: &[ContactRow]) -> Option<&ContactRow> {
-    rows.iter().max_by(|a, b| a.pressure.total_cmp(&b.pressure))
 }
 
 /// The rows of the foundation `name`.

@@ -19,6 +19,8 @@ mod error;
 mod figures;
 mod load_case;
 mod loads;
+mod mean_displacement;
+mod nodal_stress;
 mod notes;
 mod penetration;
 mod probe;
@@ -28,18 +30,21 @@ mod supports;
 mod unresolved;
 
 pub use collapse::Collapse;
-pub(crate) use contact_figures::{peak, rows_of};
+pub(crate) use contact_figures::{ContactFigures, rows_of};
 pub use contact_line::{ContactLine, ContactRow};
 pub use error::SetupError;
-pub use figures::{Bar, Dimension};
-pub(crate) use figures::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO, whole_and_parts};
+pub use figures::{Bar, Dimension, Figure, Figures, Of, Value};
+pub(crate) use figures::{NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
+use figures::{PartOfBoundary, Parts};
 pub(crate) use load_case::LoadCase;
 pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
 use loads::near_jumps;
+pub(crate) use mean_displacement::MeanDisplacement;
+use mean_displacement::Means;
+pub use nodal_stress::{NodalStress, Strained, principal, principal_direction};
 use notes::NOTED;
 pub use notes::locks;
-pub(crate) use probe::OBSERVED;
 pub(crate) use singular::SEEN;
 pub use singular::Singular;
 pub use state::State;
@@ -56,7 +61,10 @@ use crate::{
 };
 use boundary_conditions::BoundaryConditions;
 use probe::Probes;
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, OnceLock},
+};
 
 /// A scene on its mesh, ready for the time steps.
 #[derive(Debug)]
@@ -78,6 +86,10 @@ pub struct DiscreteProblem {
     /// The boundaries that support the body.
     pub supports: Supports,
     probes: Probes,
+    means: Means,
+    /// Everything that a run prints.
+    pub figures: Figures,
+    nodal_stress: OnceLock<Arc<NodalStress>>,
     /// max ‖·‖₂ of the nodal loads over sampled times of the run, N per metre of thickness.
     pub(crate) largest_load: f64,
     /// KKT tolerance.
@@ -118,7 +130,7 @@ impl DiscreteProblem {
         let norms = (scene.sample_times(notes::TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
-        let problem = Self {
+        let mut problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
             elasticity: Elasticity::new(scene.materials()),
@@ -128,6 +140,9 @@ impl DiscreteProblem {
             loads,
             supports,
             probes: Probes::new(&scene, &body)?,
+            means: Means::new(&scene, &body, &lines),
+            figures: Figures::default(),
+            nodal_stress: OnceLock::new(),
             tolerance: scene.contact.tolerance,
             materials: scene.materials_in(&body.materials),
             foundations: foundations.map(|boundary| boundary.name.clone()).collect(),
@@ -136,6 +151,7 @@ impl DiscreteProblem {
             undivided: None,
             collapse: None,
         };
+        problem.figures = Figures::new(&problem.parts());
         problem.until_collapse()
     }
 
@@ -152,10 +168,22 @@ impl DiscreteProblem {
             loads: self.loads.restrict(&subdomain),
             supports: self.supports.restrict(&subdomain),
             probes: self.probes.restrict(&self.body, &subdomain),
+            means: self.means.restrict(&subdomain),
+            nodal_stress: OnceLock::new(),
             body: subdomain.body(&self.body),
             undivided: Some((self.body.mesh, owners)),
             ..self
         })
+    }
+
+    /// The names of the materials of the body.
+    pub fn materials(&self) -> impl Iterator<Item = &str> + Clone {
+        self.materials.iter().map(|(_, name)| &**name)
+    }
+
+    /// The names of the boundaries with a gap.
+    pub fn foundations(&self) -> &[String] {
+        &self.foundations
     }
 
     /// Is there a Γ_C?
@@ -192,37 +220,21 @@ impl DiscreteProblem {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
     }
 
-    /// The names of the quantities of a step that are not in its record. Per supporting boundary: the resultant of
-    /// its forces on the body, N per metre of thickness, and their moment about the origin, N. Per probe:
-    /// displacement, m, damage and stress, Pa.
-    pub fn quantities(&self) -> Vec<String> {
-        let resultants = ["force_x", "force_y", "moment"];
-        let probes: Vec<_> = self.scene.probes.iter().map(|probe| probe.name.clone()).collect();
-        let columns = |names: &[String], of: &[&str]| -> Vec<String> {
-            names.iter().flat_map(|name| of.iter().map(move |of| format!("{name}.{of}"))).collect()
-        };
-        [columns(&self.supports.names, &resultants), columns(&probes, &OBSERVED)].concat()
-    }
-
-    /// The values of [`Self::quantities`] in a state with the residual forces `unbalanced` = f − Ku. Forces up to
-    /// `rounding`, N per metre of thickness, are zero. Collective.
-    pub(crate) fn quantities_in(
-        &self,
-        state: &State,
-        unbalanced: &[f64],
-        rounding: f64,
-    ) -> Vec<f64> {
-        let zeta = self.zeta_at_points(&state.zeta);
-        let stress = |t: usize, at: [f64; 3]| {
-            self.elasticity.stress_at(&self.body, (t, at), &zeta, &state.u)
-        };
-        let contact = (&state.contact[..], state.time);
-        let mut values = self.supports.resultants(&self.body, unbalanced, contact, stress);
-        values.extend(self.probes.values(self, state));
-        let partition = &self.body.nodes.partition;
-        partition.comm().sum(&mut values);
-        let displacement = SHOWN_AS_ZERO * partition.max_norm(&state.u);
-        self.without_rounding(values, (rounding, displacement))
+    /// The parts of the scene of which there are figures.
+    fn parts(&self) -> Parts<'_> {
+        let several = if self.materials.len() > 1 { &self.materials[..] } else { &[] };
+        let number = |names: &[String], of: &str| names.iter().position(|name| name == of);
+        let boundaries = self.scene.boundaries.iter().map(|of| PartOfBoundary {
+            name: &of.name,
+            support: number(&self.supports.names, &of.name),
+            foundation: number(&self.foundations, &of.name),
+            moves: of.gap().is_some_and(|gap| gap.distance.depends_on_time()),
+        });
+        Parts {
+            materials: several.iter().map(|(_, name)| &**name).collect(),
+            boundaries: boundaries.collect(),
+            probes: self.scene.probes.iter().map(|probe| &*probe.name).collect(),
+        }
     }
 
     /// η_*(ζ).

@@ -11,10 +11,6 @@ use nalgebra::Vector3;
 #[derive(Debug)]
 pub(super) struct Probes(Vec<(Vec<Location>, Option<Vec<usize>>)>);
 
-/// The quantities at each probe: displacement, m; damage; stress, Pa.
-pub(crate) const OBSERVED: [&str; 7] =
-    ["u_x", "u_y", "zeta", "stress_xx", "stress_yy", "stress_xy", "von_mises"];
-
 impl Probes {
     /// Finds the probes of `scene` in the undivided `body`.
     ///
@@ -46,12 +42,12 @@ impl Probes {
         Self(self.0.iter().map(local).collect())
     }
 
-    /// The quantities at all probes; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point, with the mean
+    /// u_x, u_y, m, ζ, σ_xx, σ_yy, σ_xy and the von Mises stress, Pa, at each probe; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point, with the mean
     /// strain of its triangles.
-    pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<f64> {
+    pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<[f64; 7]> {
         let (elasticity, body) = (&problem.elasticity, &problem.body);
         let values = |(locations, triangles): &(Vec<Location>, Option<Vec<usize>>)| {
-            let Some(triangles) = triangles else { return [0.0; OBSERVED.len()] };
+            let Some(triangles) = triangles else { return [0.0; 7] };
             let values = locations.iter().zip(triangles);
             let values = values.map(|(of, &t)| of.values(body, t, &state.u, &state.zeta));
             let values = Vec::from_iter(values);
@@ -62,6 +58,6 @@ impl Probes {
             let von_mises = elasticity.material(body, t).von_mises(&stress);
             [at.u[0], at.u[1], at.zeta, stress[0], stress[1], stress[2], von_mises]
         };
-        self.0.iter().flat_map(values).collect()
+        self.0.iter().map(values).collect()
     }
 }

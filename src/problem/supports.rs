@@ -110,11 +110,11 @@ impl Supports {
         unbalanced: &[f64],
         (contact, t): (&[ContactPoint], f64),
         stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
-    ) -> Vec<f64> {
-        let mut sums = vec![0.0; 3 * self.names.len()];
+    ) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.names.len()];
         let points = &body.nodes.points;
         let mut add = |boundary: usize, [x, y]: [f64; 2], [fx, fy]: [f64; 2]| {
-            for (sum, part) in sums[3 * boundary..].iter_mut().zip([fx, fy, x * fy - y * fx]) {
+            for (sum, part) in sums[boundary].iter_mut().zip([fx, fy, x * fy - y * fx]) {
                 *sum += part;
             }
         };

@@ -30,8 +30,9 @@ fn an_accuracy_is_reached_and_its_mesh_is_kept() {
     let again = test_directory.summary("out/again");
     assert_eq!(first["triangles"], again["triangles"]);
     for key in ["displacement_max", "work", "zeta_min", "zeta_mean", "contact_force"] {
-        let [a, b] = [&first, &again].map(|summary| summary[key].as_f64().unwrap());
-        let bar = first["errors"]["figures"][key].as_f64().unwrap();
+        let [a, b] =
+            [&first, &again].map(|summary| summary["figures"][key]["value"].as_f64().unwrap());
+        let bar = first["figures"][key]["bar"].as_f64().unwrap();
         assert!((a - b).abs() <= bar && bar <= 0.05 * a.abs().max(1.0), "{key}: {a}, {b} ± {bar}");
     }
 
@@ -61,18 +62,19 @@ fn error_bars_are_measured_where_they_are_asked_for() {
     let said = test_directory.run(&["--bars"]);
     assert!(said.out.contains("± "), "{}", said.out);
     let summary = test_directory.summary("out/scene");
-    let bars = summary["errors"]["figures"].as_object().unwrap();
+    let bar = |key: &str| summary["figures"][key]["bar"].as_f64();
     for key in ["work", "displacement_max", "zeta_min", "bottom.force_y"] {
-        assert!(bars[key].as_f64().unwrap() > 0.0, "{key}");
+        assert!(bar(key) > Some(0.0), "{key}");
     }
     // The source at its end shows the error of a single step.
-    let fine = summary["zeta_min"].as_f64().unwrap();
+    let fine = summary["figures"]["zeta_min"]["value"].as_f64().unwrap();
     test_directory.run(&["--bars", "--set", "time.step=1"]);
     let summary = test_directory.summary("out/scene");
-    let error = (summary["zeta_min"].as_f64().unwrap() - fine).abs();
-    assert!(error < summary["errors"]["figures"]["zeta_min"].as_f64().unwrap(), "{error}");
+    let error = (summary["figures"]["zeta_min"]["value"].as_f64().unwrap() - fine).abs();
+    assert!(error < summary["figures"]["zeta_min"]["bar"].as_f64().unwrap(), "{error}");
     test_directory.run(&[]);
-    assert_eq!(test_directory.summary("out/scene")["errors"]["figures"], serde_json::json!({}));
+    let figures = test_directory.summary("out/scene")["figures"].clone();
+    assert!(figures.as_object().unwrap().values().all(|figure| figure["bar"].is_null()));
 }
 
 #[test]
@@ -177,8 +179,8 @@ fn probes_between_chords_and_arcs_are_found_in_their_material() {
     directory.write("scene.toml", &scene);
     for size in ["mesh.parameters.size=2", "mesh.parameters.size=0.7"] {
         directory.run(&["--set", size]);
-        let quantities = directory.summary("out/scene")["quantities"].clone();
-        let stress = |name: String| quantities[name].as_f64().expect("a stress");
+        let figures = directory.summary("out/scene")["figures"].clone();
+        let stress = |name: String| figures[name]["value"].as_f64().expect("a stress");
         for i in 0..36 {
             let [outer, inner] = ["outer", "inner"].map(|of| stress(format!("{of}{i}.stress_xx")));
             assert!((outer - inner).abs() < 0.2, "{size}, {i}: {outer}, {inner}");
@@ -210,8 +212,8 @@ fn bars_hold_where_two_meshes_agree_by_chance() {
         directory.write(file, geometry);
         directory.run(&["--bars", "--set", "discretisation.displacement=2"]);
         let summary = directory.summary("out/scene");
-        let value = summary[figure].as_f64().expect("a value");
-        let bar = summary["errors"]["figures"][figure].as_f64().expect("a bar");
+        let value = summary["figures"][figure]["value"].as_f64().expect("a value");
+        let bar = summary["figures"][figure]["bar"].as_f64().expect("a bar");
         assert!((value - truth).abs() <= bar && bar < 0.05 * truth, "{figure}: {value} ± {bar}");
     }
 }
@@ -241,10 +243,10 @@ fn error_bars_hold_on_curved_sides() {
     for (accuracy, more) in [(0.05, &[][..]), (0.01, &[]), (0.002, &[]), (0.05, linear)] {
         directory.run(&[&["--accuracy", &accuracy.to_string()], more].concat());
         let summary = directory.summary("out/scene");
-        let found = summary["displacement_max"].as_f64().unwrap();
-        let bar = summary["errors"]["figures"]["displacement_max"].as_f64().unwrap();
+        let found = summary["figures"]["displacement_max"]["value"].as_f64().unwrap();
+        let bar = summary["figures"]["displacement_max"]["bar"].as_f64().unwrap();
         assert!((found - exact).abs() <= bar, "{accuracy}: {found} ± {bar}, not {exact}");
-        let work = summary["work"].as_f64().unwrap() / (FRAC_PI_2 * exact);
+        let work = summary["figures"]["work"]["value"].as_f64().unwrap() / (FRAC_PI_2 * exact);
         assert!((work - 1.0).abs() < accuracy * accuracy, "{accuracy}: {work} of the work");
     }
 }
@@ -291,8 +293,8 @@ fn first_meshes_follow_an_ellipse() {
         );
         directory.write("scene.toml", &scene);
         let said = directory.run(&["--accuracy", "0.1"]);
-        let quantities = &directory.summary("out/scene")["quantities"];
-        let found = quantities["base.force_y"].as_f64().unwrap() - 8.0;
+        let figures = &directory.summary("out/scene")["figures"];
+        let found = figures["base.force_y"]["value"].as_f64().unwrap() - 8.0;
         println!("{found} of {more}\n{}", said.out);
         assert!((found - more).abs() < 1e-3 * ellipse, "{file}: {found} is not {more}");
         assert!(!said.out.contains("curved edges meet"), "{}", said.out);
@@ -322,7 +324,8 @@ fn the_contact_of_an_ellipse_is_that_of_hertz() {
     let force = 2.0 * 12.0 * 10.0;
     let hertz = (4.0 * force * 4.0 * 0.91 / (std::f64::consts::PI * 210e3)).sqrt();
     directory.run(&["--accuracy", "0.1"]);
-    let found = directory.summary("out/scene")["contact_length"].as_f64().unwrap();
+    let found =
+        directory.summary("out/scene")["figures"]["contact_length"]["value"].as_f64().unwrap();
     assert!((found - hertz).abs() < 0.1 * hertz, "{found} is not {hertz}");
 }
 
@@ -339,7 +342,8 @@ fn time_steps_become_shorter_until_the_accuracy_is_reached() {
         let said = directory.run(&["--accuracy", accuracy]);
         assert!(said.out.contains(&format!("accuracy {accuracy} reached")), "{}", said.out);
         assert!(said.out.contains("again         with shorter time steps"), "{}", said.out);
-        let found = directory.summary("out/scene")["zeta_min"].as_f64().unwrap();
+        let found =
+            directory.summary("out/scene")["figures"]["zeta_min"]["value"].as_f64().unwrap();
         let accuracy: f64 = accuracy.parse().unwrap();
         assert!(
             (found - exact).abs() < accuracy * (1.0 - exact),
@@ -367,8 +371,8 @@ fn a_stop_by_the_error_of_the_steps_is_not_reached() {
         let is_unconfirmed =
             ["NOT reached", "only this run stops"].iter().all(|w| said.out.contains(w));
         assert!(survives || is_unconfirmed, "{}", said.out);
-        if let (true, Some(bar)) = (survives, summary["errors"]["figures"]["zeta_min"].as_f64()) {
-            let error = (summary["zeta_min"].as_f64().unwrap() - 0.01643).abs();
+        if let (true, Some(bar)) = (survives, summary["figures"]["zeta_min"]["bar"].as_f64()) {
+            let error = (summary["figures"]["zeta_min"]["value"].as_f64().unwrap() - 0.01643).abs();
             assert!(error <= bar, "{accuracy}: {error} exceeds {bar}");
         }
     }
@@ -400,12 +404,12 @@ fn bars_hold_where_the_damage_begins_with_the_last_step() {
     let damage = "diffusion = 0.1, lambda_d = 1, lambda_u = 4e6";
     write_bar(&directory, 1e9, damage, "gap = '0.019 - 0.02*t'");
     directory.run(&["--set", "time.step=0.0005"]);
-    let exact = directory.summary("out/scene")["zeta_min"].as_f64().unwrap();
+    let exact = directory.summary("out/scene")["figures"]["zeta_min"]["value"].as_f64().unwrap();
     for step in ["0.05", "0.04", "0.01"] {
         let said = directory.run(&["--bars", "--set", &format!("time.step={step}")]);
         let summary = directory.summary("out/scene");
-        let error = (summary["zeta_min"].as_f64().unwrap() - exact).abs();
-        let bar = summary["errors"]["figures"]["zeta_min"].as_f64().unwrap();
+        let error = (summary["figures"]["zeta_min"]["value"].as_f64().unwrap() - exact).abs();
+        let bar = summary["figures"]["zeta_min"]["bar"].as_f64().unwrap();
         assert!(error <= bar && bar < 5.0 * error, "{error} is not {bar}: {}", said.out);
     }
 }
@@ -488,8 +492,8 @@ fn meshes_beyond_the_limits_of_memory_and_time_are_not_begun() {
         |accuracy, more: &[&str]| directory.run(&[&["--accuracy", accuracy], more].concat());
     let force = || {
         let summary = directory.summary("out/scene");
-        let bar = summary["errors"]["figures"]["contact_force"].as_f64();
-        (summary["contact_force"].as_f64().unwrap(), bar)
+        let bar = summary["figures"]["contact_force"]["bar"].as_f64();
+        (summary["figures"]["contact_force"]["value"].as_f64().unwrap(), bar)
     };
     asked("0.003", &[]);
     let (exact, off) = force();

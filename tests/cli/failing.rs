@@ -130,7 +130,10 @@ fn damage_that_is_not_finite() {
     said.fails(1, &["step 4 (t = 0.4): the damage equation has no finite answer"]);
     assert!(said.out.contains("FAILED after t = 0.3"), "{}", said.out);
     let summary = test_directory.summary("out/scene");
-    assert_eq!((&summary["steps"], &summary["zeta_min"]), (&3.into(), &1.0.into()));
+    assert_eq!(
+        (&summary["steps"], &summary["figures"]["zeta_min"]["value"]),
+        (&3.into(), &1.0.into())
+    );
     assert_eq!(test_directory.history("out/scene").1.len(), 4);
 
     // Chosen steps are cut until it is hopeless, and not one bad state is kept.

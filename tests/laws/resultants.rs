@@ -3,7 +3,7 @@
 use crate::{
     bore::disc,
     support::{
-        ORDERS, adapted, bent, close, distorted, history, moved, order, problem, run, scene,
+        self, ORDERS, adapted, bent, close, distorted, history, moved, order, problem, run, scene,
         square, turn, unstructured,
     },
 };
@@ -14,14 +14,9 @@ use signorini::{
 };
 use std::{collections::BTreeMap, f64::consts::PI};
 
-/// The quantities and the figures of contact of the last state, by name.
+/// The figures of the last state, by name.
 fn figures(problem: &DiscreteProblem) -> BTreeMap<String, f64> {
-    let last = run(problem, SOLVERS[0]).last;
-    let names = [problem.quantities(), problem.contact_columns()].concat();
-    names
-        .into_iter()
-        .zip([last.quantities, problem.contact_figures(&last.state)].concat())
-        .collect()
+    support::figures(problem, &run(problem, SOLVERS[0]).last)
 }
 
 fn of_order(mesh: Mesh, order: Order, text: &str) -> Result<DiscreteProblem, SetupError> {
@@ -94,9 +89,7 @@ fn contact_without_force_has_no_figures_and_light_contact_has() {
                 );
                 let problem = of_order(distorted(4), order, &text).unwrap();
                 let last = history(&problem, SOLVERS[0]).1.last;
-                let found = problem.contact_columns().into_iter();
-                let found = found.zip(problem.contact_figures(&last.state));
-                let found: BTreeMap<String, f64> = found.collect();
+                let found = support::figures(&problem, &last);
                 let pressed = left < 0.0;
                 let name = format!("P{} {wall} {left}", 1 + order as u8);
                 assert_eq!(last.record.active_nodes > 0, pressed, "{name}");

@@ -14,7 +14,7 @@ use signorini::{
     petsc::Session,
     scene::Scene,
 };
-use std::{fs, path::Path};
+use std::{collections::BTreeMap, fs, path::Path};
 use tempfile::TempDir;
 
 /// A damage law of which every constant counts.
@@ -257,4 +257,10 @@ fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> f64 {
         xx += (point.0 - x) * (point.0 - x);
     }
     xy / xx
+}
+
+/// The figures of a step by their names.
+pub fn figures(problem: &DiscreteProblem, step: &Step) -> BTreeMap<String, f64> {
+    let values = step.figures.iter().map(|of| of.value);
+    problem.figures.iter().map(|of| of.name.clone()).zip(values).collect()
 }

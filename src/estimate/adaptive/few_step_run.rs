@@ -1,10 +1,10 @@
 //! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
-    estimate::{Extremes, NodalStress, RecoveredStrains, UNLOADED, strained},
+    estimate::{Extremes, RecoveredStrains, UNLOADED},
     evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
-    problem::{DiscreteProblem, State},
+    problem::{DiscreteProblem, NodalStress, State, Value},
 };
 
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated. On six bodies,
@@ -19,14 +19,13 @@ const LARGER: f64 = 1.5;
 pub(super) struct FewStepRun<'a> {
     pub(super) problem: &'a DiscreteProblem,
     pub(super) outcome: Outcome,
+    /// The extremes at the end.
+    pub(super) extremes: Extremes<'a>,
     history: History,
 }
 
 /// The figures and the estimated errors of the steps of a run.
 struct History {
-    stress: NodalStress,
-    /// The extremes at the last time at which errors are estimated.
-    extremes: Extremes,
     /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
     last: Option<f64>,
@@ -42,8 +41,6 @@ struct History {
     depths: Vec<f64>,
     /// The times at which steps end, s.
     times: Vec<f64>,
-    /// The maximum size of each extreme at the times at which errors are estimated.
-    sizes_of_extremes: Vec<f64>,
 }
 
 impl<'a> FewStepRun<'a> {
@@ -57,7 +54,7 @@ impl<'a> FewStepRun<'a> {
         instants: usize,
         followed: &[f64],
     ) -> Result<Self, RunError> {
-        let mut history = History::new(problem, instants, triangles);
+        let mut history = History::new(instants, triangles);
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
         let observer = &mut Callback(&mut observe);
@@ -66,7 +63,9 @@ impl<'a> FewStepRun<'a> {
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;
         }
-        Ok(Self { problem, outcome, history })
+        let Step { state, figures, .. } = &outcome.last;
+        let extremes = Extremes::new(problem, state, figures)?;
+        Ok(Self { problem, outcome, extremes, history })
     }
 
     /// The time at which ζ_* was reached, s.
@@ -97,9 +96,8 @@ impl<'a> FewStepRun<'a> {
 
     /// The scales of the figures. An extreme that is `unsettled` is no scale of the others.
     pub(super) fn scales(&self, unsettled: &[String]) -> Vec<f64> {
-        let History { sizes_of_extremes, energy, .. } = &self.history;
-        let sizes = [&self.outcome.sizes, sizes_of_extremes].map(Vec::as_slice);
-        self.problem.figure_scales(sizes, unsettled, *energy, self.outcome.last.forces)
+        let (sizes, forces) = (self.outcome.sizes(self.problem), self.outcome.last.forces);
+        self.problem.figure_scales(&sizes, unsettled, self.history.energy, forces)
     }
 
     /// The times at which steps end, s.
@@ -107,26 +105,22 @@ impl<'a> FewStepRun<'a> {
         &self.history.times
     }
 
-    /// All figures at the end, the extremes last.
-    pub(super) fn values(&self) -> Vec<f64> {
-        [self.outcome.last.figures(), self.extremes().values()].concat()
-    }
-
-    /// The extremes at the end.
-    pub(super) fn extremes(&self) -> &Extremes {
-        &self.history.extremes
+    /// All figures at the end.
+    pub(super) fn values(&self) -> &[Value] {
+        &self.outcome.last.figures
     }
 
     /// The length of the part of Γ_C on which the ends of contact may lie, m: half of an edge for each end.
     pub(super) fn open_length(&self) -> f64 {
         let half = |[[ax, ay], [bx, by]]: &[[f64; 2]; 2]| 0.5 * (bx - ax).hypot(by - ay);
-        self.extremes().ends.iter().map(half).sum()
+        self.extremes.ends.iter().map(half).sum()
     }
 
     /// This length over the largest length of contact.
     pub(super) fn open(&self) -> f64 {
-        let (open, length) = (self.open_length(), self.extremes().of_points.len());
-        if open > 0.0 { open / self.history.sizes_of_extremes[length] } else { 0.0 }
+        let length = self.problem.figures.number("contact_length");
+        let length = length.map(|number| self.outcome.sizes(self.problem)[number]);
+        length.filter(|length| *length > 0.0).map_or(0.0, |length| self.open_length() / length)
     }
 
     /// ζ at the end at the vertices of each triangle of the undivided mesh. Collective.
@@ -156,10 +150,8 @@ impl<'a> FewStepRun<'a> {
 }
 
 impl History {
-    fn new(problem: &DiscreteProblem, instants: usize, triangles: usize) -> Self {
+    fn new(instants: usize, triangles: usize) -> Self {
         Self {
-            stress: NodalStress::new(problem),
-            extremes: Extremes::none(problem.body.nodes.partition.comm()),
             instants,
             last: None,
             squares: vec![0.0; triangles],
@@ -169,7 +161,6 @@ impl History {
             end: Default::default(),
             depths: vec![0.0; triangles],
             times: Vec::new(),
-            sizes_of_extremes: Vec::new(),
         }
     }
 
@@ -196,16 +187,9 @@ impl History {
             *deepest = deepest.max(penetration.depth);
         }
         let zeta = problem.zeta_at_points(&state.zeta);
-        let state = &strained(problem, state);
-        let strained = NodalStress::strained(problem, state);
-        let recovered = RecoveredStrains::on(&self.stress.patches, body, strained.strains)?;
-        let stresses = self.stress.by_fits(&recovered.fits, &strained.zeta);
-        let extremes = Extremes::new(problem, state, &self.stress, &stresses);
-        let values = extremes.values();
-        self.sizes_of_extremes.resize(values.len(), 0.0);
-        let sizes = self.sizes_of_extremes.iter_mut().zip(values);
-        sizes.for_each(|(most, value)| *most = most.max(value.abs()));
-        self.extremes = extremes;
+        let state = &problem.strained(state);
+        let strains = NodalStress::strained(problem, state).strains;
+        let recovered = RecoveredStrains::on(&problem.nodal_stress().patches, body, strains)?;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));

@@ -16,7 +16,7 @@ use crate::{
     evolution::AIM,
     mesh::{Mesh, Order},
     petsc::Session,
-    problem::{Bar, Dimension, DiscreteProblem},
+    problem::{Bar, Dimension, DiscreteProblem, Figure},
 };
 
 /// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest. Half of it
@@ -180,8 +180,9 @@ impl Measurement {
             measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
             measured.zeta = largest;
         }
-        measured.extremes = problem.extremes();
-        measured.of_points = fine.extremes().named(&problem.singular_points());
+        let extremes = problem.figures.iter().filter(|of| of.is_extreme());
+        measured.extremes = extremes.map(|of| of.name.clone()).collect();
+        measured.of_points = fine.extremes.named(&problem.singular_points());
         measured
     }
 
@@ -193,20 +194,22 @@ impl Measurement {
         }
         let problem = coarse.problem;
         // The extreme of the whole settles if that of its part does.
-        let part = |i: usize| fine.extremes().part_of(i);
-        let first = problem.figure_names().len() - self.extremes.len();
-        let settles = |&i: &usize| sequence.settles(first + part(i), &self.of_points[part(i)]);
-        let unsettled = (0..self.of_points.len()).filter(|i| !settles(i));
-        self.unsettled = unsettled.map(|i| self.of_points[i].name.clone()).collect();
-        let error = |(i, dimension)| match dimension {
+        let settles = |extreme: &&Extreme| {
+            let part = problem.part_of(extreme.number, fine.values());
+            let part = self.of_points.iter().find(|of| of.number == part).unwrap_or(extreme);
+            sequence.settles(part.number, part)
+        };
+        let unsettled = self.of_points.iter().filter(|of| !settles(of));
+        self.unsettled = unsettled.map(|of| of.name.clone()).collect();
+        let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
             Dimension::Stress => sequence.error_of_stress(i),
             _ => sequence.error(i),
         };
-        let errors = Vec::from_iter(problem.dimensions().into_iter().enumerate().map(error));
+        let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
         self.bars = problem.bars(&errors, &fine.scales(&self.unsettled));
         self.bars.retain(|bar| !self.unsettled.contains(&bar.name));
-        coarse.extremes().join(&mut self.bars);
+        problem.join_bars(&mut self.bars, coarse.values());
     }
 
     /// The names of the extremes.
@@ -255,7 +258,7 @@ impl Measurement {
 
     /// The part of `accuracy` that the mesh leaves to the time steps. These change the figures of ζ most.
     pub(super) fn left_to_steps(&self, accuracy: f64) -> f64 {
-        let bars = self.bars.iter().filter(|bar| bar.dimension == Dimension::Damage);
+        let bars = self.bars.iter().filter(|bar| bar.dimension.is_damage());
         accuracy - bars.map(Bar::relative).fold(0.0, f64::max).min(SHARE * accuracy)
     }
 
@@ -273,7 +276,7 @@ impl Measurement {
         let at = of_extreme.or_else(|| self.probes.iter().find(at_probe).map(|probe| probe.1));
         match (bar.dimension, at) {
             (Dimension::ContactLength, _) => Cause::Ends,
-            (Dimension::Damage, _) if name != "zeta_mean" => Cause::Change(self.zeta.clone()),
+            (Dimension::Zeta | Dimension::LeastZeta, _) => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
             (Dimension::Length, Some(at)) => Cause::Around(at, 0),
             (_, Some(at)) => Cause::Around(at, 1),

@@ -126,7 +126,7 @@ impl<'a> Round<'a> {
     /// The measured errors that miss the accuracy, over the allowed ones, with their causes.
     fn missed(&self, measured: Option<&Measurement>) -> Vec<(f64, Cause)> {
         let Some(measured) = measured else { return Vec::new() };
-        let has_points = !self.singular.is_empty() || !self.run.extremes().ends.is_empty();
+        let has_points = !self.singular.is_empty() || !self.run.extremes.ends.is_empty();
         let errors = measured.errors(&self.scene.accuracy_of).into_iter();
         let errors = errors.map(|error| (error.excess(self.accuracy), measured.cause(&error.name)));
         let with_points = |(excess, cause)| match cause {
@@ -231,7 +231,7 @@ impl<'a> Round<'a> {
         let is_known = self.error < 2.0 * self.accuracy;
         let open = if is_known { self.open } else { 0.0 };
         let at_ends = halvings(open / AIM).max(of_length).max(of_reactions);
-        let ends = self.run.extremes().ends.as_flattened().iter().map(|&end| (end, at_ends));
+        let ends = self.run.extremes.ends.as_flattened().iter().map(|&end| (end, at_ends));
         singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
     }
 }

@@ -24,7 +24,7 @@ pub(super) struct Level {
     mesh: Mesh,
     /// η.
     error: f64,
-    /// The figures at the end, the extremes last.
+    /// The figures at the end.
     values: Vec<f64>,
     /// The length of the part of Γ_C on which the ends of contact may lie, m.
     open: f64,
@@ -35,7 +35,13 @@ pub(super) struct Level {
 impl Level {
     pub(super) fn new(run: &FewStepRun, mesh: Mesh) -> Self {
         let (error, _) = run.relative();
-        Self { mesh, error, values: run.values(), open: run.open_length(), stop: run.stop() }
+        Self {
+            mesh,
+            error,
+            values: run.values().iter().map(|of| of.value).collect(),
+            open: run.open_length(),
+            stop: run.stop(),
+        }
     }
 }
 

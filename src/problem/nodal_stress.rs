@@ -1,43 +1,46 @@
 //! Stresses at the nodes, as engineers look at them: continuous within a material.
 
-use super::patches::{ENTRIES, Fit, Patches, monomials};
+use super::{DiscreteProblem, State, Value, figures::greatest};
 use crate::{
-    fem::{Elements, Partition, for_elements},
-    model::Material,
+    ROUNDING,
+    fem::{Elements, Fit, Partition, Patches, RigidMotion, for_elements, monomials},
+    model::{Material, von_mises},
     petsc::PetscError,
-    problem::{DiscreteProblem, State},
 };
 use nalgebra::{Matrix3, Vector3};
 use rustc_hash::FxHashMap as HashMap;
+use std::{borrow::Cow, sync::Arc};
 
 /// σ = η_*(ζ) 𝒜ε* at the nodes of this rank, with the recovered strains ε*
-/// ([`RecoveredStrains`](super::RecoveredStrains)).
+/// ([`RecoveredStrains`](crate::estimate::RecoveredStrains)).
 ///
 /// A node where materials meet is several points, one for each material. The first point of each node has the
 /// node's number; the others follow. This value needs neither PETSc nor the problem, so that a thread can use it.
+#[derive(Debug)]
 pub struct NodalStress {
-    pub(super) patches: Patches,
-    pub(super) points: Vec<Point>,
+    pub(crate) patches: Patches,
+    pub(crate) points: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
     materials: Vec<(Material, Matrix3<f64>)>,
 }
 
 /// A node, as a point of one material.
-pub(super) struct Point {
+#[derive(Debug)]
+pub(crate) struct Point {
     node: usize,
-    pub(super) material: usize,
-    pub(super) at: [f64; 2],
+    pub(crate) material: usize,
+    pub(crate) at: [f64; 2],
     /// The vertices whose fits give its strain: itself, or the ends of its side.
-    pub(super) ends: [usize; 2],
+    pub(crate) ends: [usize; 2],
 }
 
 /// What the stresses of a state are made from.
 pub struct Strained {
     /// ε(u) at the quadrature points.
-    pub(super) strains: Vec<Vector3<f64>>,
+    pub(crate) strains: Vec<Vector3<f64>>,
     /// η_*(ζ) at the nodes.
-    pub(super) zeta: Vec<f64>,
+    pub(crate) zeta: Vec<f64>,
 }
 
 impl NodalStress {
@@ -103,21 +106,18 @@ impl NodalStress {
         strained: &Strained,
         vertices: Option<&Partition>,
     ) -> Result<Vec<[f64; 4]>, PetscError> {
-        let mut update = |fields: &mut [f64]| match vertices {
-            Some(vertices) => vertices.update(fields, ENTRIES),
-            None => Ok(()),
-        };
-        let fits = self.patches.fits(&strained.strains, &mut update)?;
+        let fits = self.patches.fits(&strained.strains, vertices)?;
         Ok(self.by_fits(&fits, &strained.zeta))
     }
 
     /// As [`Self::stresses`], with the fits of the strains and η_*(ζ) at the nodes.
-    pub(super) fn by_fits(&self, fits: &[Vec<Fit>], zeta: &[f64]) -> Vec<[f64; 4]> {
+    pub(crate) fn by_fits(&self, fits: &[Vec<Option<Fit>>], zeta: &[f64]) -> Vec<[f64; 4]> {
         let stress = |point: &Point| {
             let [x, y] = point.at;
             let strain = |end: usize| {
                 let [vx, vy] = self.patches.vertices[end];
-                fits[point.material][end].transpose() * monomials([x - vx, y - vy])
+                let fit = fits[point.material][end].as_ref();
+                fit.map_or_else(Vector3::zeros, |fit| fit.tr_mul(&monomials([x - vx, y - vy])))
             };
             let (material, stiffness) = &self.materials[point.material];
             let strain = 0.5 * (strain(point.ends[0]) + strain(point.ends[1]));
@@ -128,9 +128,61 @@ impl NodalStress {
     }
 }
 
-/// The principal stresses σ₁ ≥ σ₂ in the plane, Pa, and the direction of σ₁, a unit vector with x ≥ 0.
-pub fn principal([xx, yy, xy, _]: [f64; 4]) -> ([f64; 2], [f64; 2]) {
+impl DiscreteProblem {
+    /// The nodes of the body as points of stresses. Collective.
+    pub fn nodal_stress(&self) -> &Arc<NodalStress> {
+        self.nodal_stress.get_or_init(|| NodalStress::new(self).into())
+    }
+
+    /// `state`, without displacements if the body only moves rigidly: its strains are rounding. Collective.
+    pub(crate) fn strained<'a>(&self, state: &'a State) -> Cow<'a, State> {
+        let motion = RigidMotion::nearest(&self.body, &state.u);
+        let [rigid, rest] = motion.max_norms(&self.body, &state.u);
+        match rest > ROUNDING * rigid {
+            true => Cow::Borrowed(state),
+            false => Cow::Owned(State { u: vec![0.0; state.u.len()], ..state.clone() }),
+        }
+    }
+
+    /// The largest von Mises stress and σ₁, and the smallest σ₂, Pa, of the body and of each of several materials. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(crate) fn extreme_stresses(&self, state: &State) -> Result<Vec<[Value; 3]>, PetscError> {
+        let (nodal, body) = (self.nodal_stress(), &self.body);
+        let strained = NodalStress::strained(self, &self.strained(state));
+        let stresses = nodal.stresses(&strained, Some(&body.vertices.partition))?;
+        let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; self.materials.len().max(1)];
+        for (stress, point) in stresses.iter().zip(&nodal.points) {
+            let [most, least] = principal(*stress);
+            let is_own = |(number, _): &(usize, String)| *number == point.material;
+            let part = self.materials.iter().position(is_own).unwrap_or(0);
+            for (largest, value) in largest[part].iter_mut().zip([von_mises(*stress), most, -least])
+            {
+                if value >= largest.0 {
+                    *largest = (value, point.at);
+                }
+            }
+        }
+        let comm = body.nodes.partition.comm();
+        let of = |parts: &[[(f64, [f64; 2]); 3]]| {
+            let [von_mises, most, least] =
+                [0, 1, 2].map(|k| greatest(comm, parts.iter().map(|part| part[k])));
+            [von_mises, most, Value { value: -least.value, ..least }]
+        };
+        let parts = if largest.len() > 1 { &largest[..] } else { &[] };
+        Ok([of(&largest)].into_iter().chain(parts.chunks(1).map(of)).collect())
+    }
+}
+
+/// The principal stresses σ₁ ≥ σ₂ in the plane, Pa.
+pub fn principal([xx, yy, xy, _]: [f64; 4]) -> [f64; 2] {
     let (mean, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
+    [mean + radius, mean - radius]
+}
+
+/// The direction of σ₁, a unit vector with x ≥ 0.
+pub fn principal_direction([xx, yy, xy, _]: [f64; 4]) -> [f64; 2] {
     let (sine, cosine) = (0.5 * xy.atan2(0.5 * (xx - yy))).sin_cos();
-    ([mean + radius, mean - radius], [cosine, sine])
+    [cosine, sine]
 }

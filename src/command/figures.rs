@@ -1,0 +1,151 @@
+//! The figures of the last accepted state, as the screen and `summary.json` tell them.
+
+use super::task::Task;
+use serde::Serialize;
+use signorini::{
+    estimate::Extreme,
+    evolution::{GoverningValue, Outcome, Step},
+    mesh::Mesh,
+    output::terminal::{plain, with_bar},
+    problem::{Dimension, Figure, Of},
+};
+
+/// A figure of the last state.
+#[derive(Serialize)]
+pub(super) struct LastFigure<'a> {
+    #[serde(skip)]
+    pub(super) figure: &'a Figure,
+    label: &'a str,
+    pub(super) unit: String,
+    /// Null if there is no such place.
+    pub(super) value: f64,
+    /// The error bar, if the errors were measured and the mesh determines the figure.
+    bar: Option<f64>,
+    /// Its place, m, if it is found at one.
+    at: Option<[f64; 2]>,
+    /// Why the mesh does not determine an extreme.
+    singular: Option<String>,
+    unresolved: Option<String>,
+    /// The extreme over all steps, and its time.
+    governing: Option<GoverningValue>,
+}
+
+/// The figures of the last state, and how they are written.
+pub(super) struct LastFigures<'a> {
+    pub(super) all: Vec<LastFigure<'a>>,
+    mesh: &'a Mesh,
+    /// The decimals of a figure without a bar: all that the residuals deserve, or two if the measurement gave no bar.
+    digits: usize,
+    /// The digits that the estimated error of u leaves in a stress, at most five.
+    of_stress: usize,
+}
+
+/// The extremes below these times the largest one of the run are shown with that.
+const SMALLER: f64 = 0.999;
+
+impl<'a> LastFigures<'a> {
+    /// The figures of the step `last` of a run, whose `extremes` the mesh may not determine.
+    pub(super) fn new(
+        task: &'a Task,
+        last: &Step,
+        extremes: &[Extreme],
+        outcome: Option<&Outcome>,
+    ) -> Self {
+        let (problem, measured) = (&task.problem, &task.measured);
+        let units = &problem.scene().units;
+        let bars = outcome.map_or(&[][..], |outcome| &outcome.bars);
+        let figure = |(i, figure): (usize, &'a Figure)| {
+            let extreme = extremes.iter().find(|of| of.name == figure.name);
+            let bar = bars.iter().find(|bar| bar.name == figure.name).map(|bar| bar.bar);
+            LastFigure {
+                figure,
+                label: &figure.label,
+                unit: figure.dimension.unit(units),
+                value: last.figures[i].value,
+                bar: bar.filter(|_| extreme.is_none_or(Extreme::is_known)),
+                at: last.figures[i].at,
+                singular: extreme.and_then(|of| of.singular.clone()),
+                unresolved: extreme.and_then(|of| of.unresolved.clone()),
+                governing: last.governing[i],
+            }
+        };
+        let is_measured =
+            task.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
+        let error = outcome.map_or(0.0, |outcome| outcome.errors.displacement_mesh);
+        let of_stress = (1.0 - error.log10()).ceil().clamp(2.0, 5.0) as usize;
+        Self {
+            all: problem.figures.iter().enumerate().map(figure).collect(),
+            mesh: problem.mesh(),
+            digits: if is_measured { 3 } else { 7 },
+            of_stress: if is_measured { 3 } else { of_stress },
+        }
+    }
+
+    /// A figure by its name.
+    pub(super) fn get(&self, name: &str) -> Option<&LastFigure<'a>> {
+        self.all.iter().find(|of| of.figure.name == name)
+    }
+
+    /// A value by the name of its figure; NaN if there is no such figure.
+    pub(super) fn value(&self, name: &str) -> f64 {
+        self.get(name).map_or(f64::NAN, |of| of.value)
+    }
+
+    /// A figure with its bar or, without one, with the digits that it deserves; "" if there is no such figure.
+    pub(super) fn text(&self, name: &str) -> String {
+        self.get(name).map_or_else(String::new, |of| self.written(of, of.value))
+    }
+
+    /// As [`Self::text`], with its unit, and an extreme also with its place and why the mesh does not determine it.
+    pub(super) fn full_text(&self, name: &str) -> String {
+        let Some(of) = self.get(name) else { return String::new() };
+        let at = of.at.filter(|_| of.figure.is_extreme());
+        let at = at.map_or_else(String::new, |at| format!(" at {}", self.mesh.place(at)));
+        let reason = match (&of.singular, &of.unresolved) {
+            (Some(_), _) => ": singular",
+            (None, Some(_)) => ": not resolved",
+            (None, None) => "",
+        };
+        format!("{} {}{at}{reason}", self.written(of, of.value), of.unit)
+    }
+
+    fn written(&self, of: &LastFigure, value: f64) -> String {
+        match of.bar {
+            _ if of.singular.is_some() || of.unresolved.is_some() => plain(value, 2),
+            Some(bar) => with_bar(value, Some(bar)),
+            None if of.figure.is_extreme() => plain(value, self.of_stress),
+            None => plain(value, self.digits),
+        }
+    }
+
+    /// What makes the largest von Mises stress singular.
+    pub(super) fn singular(&self, name: &str) -> Option<&str> {
+        self.get(name)?.singular.as_deref()
+    }
+
+    /// A place by the kind of its coordinates without `_x` and `_y`; `None` without one.
+    pub(super) fn place(&self, kind: &str) -> Option<String> {
+        let place = ["x", "y"].map(|axis| self.value(&format!("{kind}_{axis}")));
+        place[0].is_finite().then(|| self.mesh.place(place))
+    }
+
+    /// The figures of the body and of contact whose extreme in the run is larger than their last value: the label, the value
+    /// and the time.
+    pub(super) fn governing(&self) -> impl Iterator<Item = (&str, String, f64)> {
+        let is_asked = |of: &&LastFigure| match (&of.figure.of, of.figure.dimension) {
+            (Of::Body | Of::Material(_), _) | (Of::Boundary(_), Dimension::Force) => true,
+            (Of::Boundary(_), _) => of.figure.is_pressure(),
+            (Of::Probe(_), _) => false,
+        };
+        self.all.iter().filter(is_asked).filter_map(|of| {
+            let governing = of.governing?;
+            // Near 1, a damage is what counts.
+            let [last, most] = match of.figure.dimension.is_damage() {
+                true => [1.0 - of.value, 1.0 - governing.value],
+                false => [of.value.abs(), governing.value.abs()],
+            };
+            let value = || format!("{} {}", plain(governing.value, 4), of.unit);
+            (last < SMALLER * most).then(|| (of.label, value(), governing.time))
+        })
+    }
+}

@@ -1,0 +1,268 @@
+//! Polynomials fitted to the strains around each vertex.
+
+use super::{Body, Cells, POINTS, Partition, for_elements, quadratic_values};
+use crate::{ROUNDING, petsc::PetscError};
+use nalgebra::{Matrix6x3, SMatrix, SVector, Vector3, Vector6};
+use std::ops::Range;
+
+/// Triangles needed to fit at a vertex; with fewer, the fits of its neighbours are averaged.
+/// On 15 scenes, with half of them meshes have half as many triangles again; with twice a bar fails.
+const ENOUGH: usize = 4;
+
+/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
+pub(crate) type Fit = Matrix6x3<f64>;
+
+/// The fits around each vertex as linear functions of the strains.
+///
+/// Around each vertex, a polynomial of the degree of u is fitted to ε(u) at the quadrature points of its triangles.
+/// A vertex at a boundary may have too few triangles. It takes the mean of its neighbours' fits or, in a layer one
+/// triangle thick, a fit of lower degree. Strains jump where two materials meet, so each material has its own fits.
+#[derive(Debug)]
+pub(crate) struct Patches {
+    pub(crate) vertices: Vec<[f64; 2]>,
+    triangles: Vec<[usize; 3]>,
+    /// The number of vertices that this rank owns; they come first.
+    owned: usize,
+    /// The number of quadrature points in a triangle.
+    pub(crate) per_triangle: usize,
+    /// At a jump of a load strains differ by the angle, at any distance: these vertices take the mean. See [`Body`].
+    near_jumps: Vec<bool>,
+    /// Per material: its triangles around each vertex.
+    around: Vec<TrianglesAround>,
+}
+
+/// The triangles of one material around each vertex, vertex after vertex in one list.
+#[derive(Debug)]
+struct TrianglesAround {
+    triangles: Vec<usize>,
+    /// Per vertex: where its triangles end in the list.
+    ends: Vec<usize>,
+    /// Per quadrature point of the triangles in the list: the factors of its strain in the coefficients of the fit. There are 3
+    /// for linear and 6 for quadratic elements.
+    factors: Vec<f64>,
+}
+
+impl TrianglesAround {
+    /// The triangles of a `material` of the body, without factors.
+    fn new(body: &Body, material: usize) -> Self {
+        let triangles = body.mesh.triangles.iter().enumerate();
+        let own = triangles.filter(|(t, _)| body.material(*t) == material);
+        // `ends` first holds the start of each vertex's list; each entry moves it towards the end of the list.
+        let mut ends = vec![0; body.mesh.nodes.len() + 1];
+        own.clone().flat_map(|(_, triangle)| triangle).for_each(|&vertex| ends[vertex + 1] += 1);
+        (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
+        let mut triangles = vec![0; ends[ends.len() - 1]];
+        for (t, triangle) in own {
+            for &vertex in triangle {
+                triangles[ends[vertex]] = t;
+                ends[vertex] += 1;
+            }
+        }
+        Self { triangles, ends, factors: Vec::new() }
+    }
+
+    /// The places of the triangles of a vertex in the list.
+    fn places(&self, vertex: usize) -> Range<usize> {
+        vertex.checked_sub(1).map_or(0, |before| self.ends[before])..self.ends[vertex]
+    }
+
+    fn of(&self, vertex: usize) -> &[usize] {
+        &self.triangles[self.places(vertex)]
+    }
+}
+
+impl Patches {
+    /// The patches of a body. Collective.
+    pub(crate) fn new(body: &Body) -> Self {
+        let samples: Vec<_> = for_elements!(body, cells => sample_points(body, &cells));
+        let last = body.materials.iter().copied().max().unwrap_or(0);
+        let last = body.vertices.partition.comm().max(f64::from(last)) as usize;
+        let mut patches = Self {
+            near_jumps: body.near_jumps.clone(),
+            vertices: body.mesh.nodes.clone(),
+            triangles: body.mesh.triangles.clone(),
+            owned: body.vertices.partition.owned(),
+            per_triangle: samples.len() / body.triangles.len(),
+            around: (0..=last).map(|material| TrianglesAround::new(body, material)).collect(),
+        };
+        for material in 0..=last {
+            patches.around[material].factors = patches.factors(&patches.around[material], &samples);
+        }
+        patches
+    }
+
+    /// The factors of the fits to strains at the `samples`, of as high a degree as the triangles of a vertex allow.
+    fn factors(&self, around: &TrianglesAround, samples: &[[f64; 2]]) -> Vec<f64> {
+        let (points, mut factors) = (self.per_triangle, Vec::new());
+        for vertex in 0..self.owned {
+            let own = around.of(vertex).iter().flat_map(|t| points * t..points * (t + 1));
+            let (at, own) = (self.vertices[vertex], own.map(|q| samples[q]));
+            match (points, self.has_own_fit(around, vertex)) {
+                _ if self.is_near_jump(vertex) => fit::<1>(at, own, points, &mut factors),
+                (1, true) => fit::<3>(at, own, points, &mut factors),
+                (1, false) => fit::<1>(at, own, points, &mut factors),
+                (_, true) => fit::<6>(at, own, points, &mut factors),
+                (_, false) => fit::<3>(at, own, points, &mut factors),
+            }
+        }
+        factors
+    }
+
+    fn is_near_jump(&self, vertex: usize) -> bool {
+        self.near_jumps.get(vertex) == Some(&true)
+    }
+
+    /// Are there enough triangles around the vertex, or does it take the mean of few?
+    fn has_own_fit(&self, around: &TrianglesAround, vertex: usize) -> bool {
+        let count = around.of(vertex).len();
+        count >= ENOUGH || (count > 0 && self.is_near_jump(vertex))
+    }
+
+    /// Per material the fits of the vertices to its strains. `vertices` is the division of the vertices among several ranks.
+    /// Fits of vertices outside the material are not used. Collective.
+    pub(crate) fn fits(
+        &self,
+        strains: &[Vector3<f64>],
+        vertices: Option<&Partition>,
+    ) -> Result<Vec<Vec<Option<Fit>>>, PetscError> {
+        self.around.iter().map(|around| self.fits_of_material(around, strains, vertices)).collect()
+    }
+
+    fn fits_of_material(
+        &self,
+        around: &TrianglesAround,
+        strains: &[Vector3<f64>],
+        partition: Option<&Partition>,
+    ) -> Result<Vec<Option<Fit>>, PetscError> {
+        let (points, coefficients) = (self.per_triangle, coefficients(self.per_triangle));
+        let own_fit = |vertex: usize| {
+            let places = around.places(vertex);
+            let factors =
+                around.factors[coefficients * points * places.start..].chunks(coefficients);
+            let own = around.triangles[places]
+                .iter()
+                .flat_map(|t| &strains[points * t..points * (t + 1)]);
+            let mut fit = Fit::zeros();
+            for (factors, strain) in factors.zip(own) {
+                for (k, &factor) in factors.iter().enumerate() {
+                    (0..3).for_each(|i| fit[(k, i)] += factor * strain[i]);
+                }
+            }
+            fit
+        };
+        let own = (0..self.vertices.len()).map(|vertex| {
+            (vertex < self.owned && self.has_own_fit(around, vertex)).then(|| own_fit(vertex))
+        });
+        let mut fits = Vec::from_iter(own);
+        update(&mut fits, partition)?;
+        // The other vertices take the mean of their neighbours' fits. Corners, with one triangle, come second,
+        // because their neighbours get fits in the first pass. Over more triangles a mean of means would extrapolate
+        // too far.
+        for most in [usize::MAX, 1] {
+            let mean = |vertex: usize| {
+                let neighbours = around.of(vertex).iter().flat_map(|&t| self.triangles[t]);
+                let known = neighbours.filter_map(|other| Some((other, fits[other]?)));
+                let at = |vertex: usize| self.vertices[vertex];
+                let (count, sum) = known.fold((0.0, Fit::zeros()), |(n, sum), (other, fit)| {
+                    (n + 1.0, sum + moved(&fit, at(other), at(vertex)))
+                });
+                (count > 0.0).then(|| (vertex, sum / count))
+            };
+            let left = (0..self.owned).filter(|&vertex| fits[vertex].is_none());
+            let left = left.filter(|&vertex| around.of(vertex).len() <= most);
+            for (vertex, fit) in Vec::from_iter(left.filter_map(mean)) {
+                fits[vertex] = Some(fit);
+            }
+            update(&mut fits, partition)?;
+        }
+        // Other vertices, as in strips one triangle thick, take a fit of the strains' degree: one triangle suffices.
+        for (vertex, fit) in fits.iter_mut().enumerate().take(self.owned) {
+            fit.get_or_insert_with(|| own_fit(vertex));
+        }
+        update(&mut fits, partition)?;
+        Ok(fits)
+    }
+}
+
+/// The coefficients of a fit, with this number of quadrature points in a triangle.
+fn coefficients(per_triangle: usize) -> usize {
+    if per_triangle > 1 { 6 } else { 3 }
+}
+
+/// Gives ghosts the fits of their owners. Collective.
+fn update(fits: &mut [Option<Fit>], vertices: Option<&Partition>) -> Result<(), PetscError> {
+    let Some(vertices) = vertices.filter(|of| !of.comm().is_serial()) else { return Ok(()) };
+    // A fit, then 1; zeros without a fit.
+    let mut entries = vec![[0.0; 19]; fits.len()];
+    for (entries, fit) in entries.iter_mut().zip(&*fits) {
+        let all = fit.iter().flat_map(|fit| fit.as_slice()).chain([&1.0]);
+        entries.iter_mut().zip(all.filter(|_| fit.is_some())).for_each(|(to, from)| *to = *from);
+    }
+    vertices.update(entries.as_flattened_mut(), 19)?;
+    for (fit, entries) in fits.iter_mut().zip(entries) {
+        *fit = (entries[18] > 0.0).then(|| Fit::from_column_slice(&entries[..18]));
+    }
+    Ok(())
+}
+
+/// The quadrature points, m, triangle by triangle.
+fn sample_points<const N: usize, const Q: usize>(
+    body: &Body,
+    cells: &Cells<N, Q>,
+) -> Vec<[f64; 2]> {
+    let points = &body.nodes.points;
+    let values: Vec<Vec<f64>> = match Q {
+        1 => vec![vec![1.0 / 3.0; 3]],
+        _ => POINTS.map(|point| quadratic_values(point).to_vec()).to_vec(),
+    };
+    let place = |nodes: &[usize; N], values: &Vec<f64>| {
+        [0, 1].map(|k| nodes.iter().zip(values).map(|(&i, value)| value * points[i][k]).sum())
+    };
+    cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
+}
+
+/// Adds the factors of the strains at the `samples` in the polynomial about `centre` that is nearest to them, in least squares,
+/// with the first N coefficients: N is 1, 3 or 6 for the degrees 0, 1, 2.
+fn fit<const N: usize>(
+    centre: [f64; 2],
+    samples: impl Iterator<Item = [f64; 2]> + Clone,
+    per_triangle: usize,
+    factors: &mut Vec<f64>,
+) {
+    let offset = |x: [f64; 2]| [x[0] - centre[0], x[1] - centre[1]];
+    let square = |x: [f64; 2]| offset(x).iter().map(|d| d * d).sum::<f64>();
+    let size = samples.clone().map(square).fold(0.0, f64::max).sqrt();
+    let row = |x: [f64; 2]| -> SVector<f64, N> {
+        monomials(offset(x).map(|x| x / size)).fixed_rows::<N>(0).into()
+    };
+    let mut normal = SMatrix::<f64, N, N>::zeros();
+    samples.clone().map(row).for_each(|row| normal += row * row.transpose());
+    // This makes the fit unique.
+    let rounding = ROUNDING * normal.trace();
+    (0..N).for_each(|i| normal[(i, i)] += rounding);
+    let Some(factor) = normal.cholesky() else {
+        factors.extend(samples.flat_map(|_| vec![0.0; coefficients(per_triangle)]));
+        return;
+    };
+    for x in samples {
+        let found = factor.solve(&row(x));
+        let scaled = [0, 1, 1, 2, 2, 2].into_iter().zip(found.iter());
+        let scaled = scaled.map(|(degree, of)| of * size.powi(-degree));
+        factors.extend(scaled.chain([0.0; 6]).take(coefficients(per_triangle)));
+    }
+}
+
+/// 1, x, y, x², xy, y².
+pub(crate) fn monomials([x, y]: [f64; 2]) -> Vector6<f64> {
+    Vector6::new(1.0, x, y, x * x, x * y, y * y)
+}
+
+/// A fit about `from` as a polynomial about `to`.
+fn moved(fit: &Fit, from: [f64; 2], to: [f64; 2]) -> Fit {
+    let [x, y] = [to[0] - from[0], to[1] - from[1]];
+    let mut moved = *fit;
+    moved.set_row(0, &(monomials([x, y]).transpose() * fit));
+    moved.set_row(1, &(fit.row(1) + 2.0 * x * fit.row(3) + y * fit.row(4)));
+    moved.set_row(2, &(fit.row(2) + x * fit.row(4) + 2.0 * y * fit.row(5)));
+    moved
+}

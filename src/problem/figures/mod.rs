@@ -1,0 +1,334 @@
+//! The figures of a run: every number that it prints with a name, a label, a unit and a place.
+//!
+//! One list, made once per problem: of the whole body, of each of several materials, of each boundary with a table, and of
+//! each probe. The columns of `history.csv`, the entries of `summary.json`, the closing lines, the error bars, the names of
+//! `accuracy_of` and the reports follow from it. A new figure is one more [`Figure`] in [`Figures::new`].
+
+mod observation;
+mod scales;
+
+pub(crate) use observation::{Observation, greatest};
+pub use scales::Bar;
+pub(crate) use scales::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO};
+
+use crate::scene::Units;
+use serde::{Deserialize, Serialize};
+use std::{fmt, iter, ops::Index, slice};
+
+/// The dimension of a figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Dimension {
+    /// J per metre of thickness.
+    Work,
+    /// m.
+    Length,
+    /// N per metre of thickness.
+    Force,
+    /// N.
+    Moment,
+    /// ζ at a point.
+    Zeta,
+    /// min ζ over the body.
+    LeastZeta,
+    /// Mean ζ of the body.
+    MeanZeta,
+    /// A stress, or the contact pressure, Pa.
+    Stress,
+    /// m, along Γ_C.
+    ContactLength,
+    /// A coordinate of a place, m. It has no error bar and no extreme in a run.
+    Place,
+}
+
+impl Dimension {
+    /// The unit, by the names of a scene; "" without a unit.
+    pub fn unit(self, units: &Units) -> String {
+        match self {
+            Self::Work => units.work(),
+            Self::Length | Self::ContactLength | Self::Place => units.length.clone(),
+            Self::Force => format!("{}/{}", units.force, units.length),
+            Self::Moment => units.force.clone(),
+            Self::Zeta | Self::LeastZeta | Self::MeanZeta => String::new(),
+            Self::Stress => units.stress.clone(),
+        }
+    }
+
+    /// Is it a value of ζ?
+    pub fn is_damage(self) -> bool {
+        matches!(self, Self::Zeta | Self::LeastZeta | Self::MeanZeta)
+    }
+}
+
+/// Which value of a run governs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Governing {
+    Largest,
+    Least,
+    LargestModulus,
+}
+
+/// What a figure describes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Of {
+    /// The whole body, or all of Γ_C.
+    Body,
+    /// One of several materials, by its name.
+    Material(String),
+    /// A boundary with a table, by its name.
+    Boundary(String),
+    /// A probe, by its name.
+    Probe(String),
+}
+
+/// The value of a figure in a state, and the place at which it is found, m, if it is found at one.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Value {
+    /// In the unit of the figure; NaN for a place that there is not.
+    pub value: f64,
+    /// m.
+    pub at: Option<[f64; 2]>,
+}
+
+impl From<f64> for Value {
+    fn from(value: f64) -> Self {
+        Self { value, at: None }
+    }
+}
+
+/// A printed number.
+pub struct Figure {
+    /// The name, as in `history.csv` and `summary.json`: `KIND`, or `NAME.KIND`.
+    pub name: String,
+    /// The part of the name that figures of the body and of its parts share.
+    pub kind: &'static str,
+    /// What it describes.
+    pub of: Of,
+    /// What it is, in words.
+    pub label: String,
+    /// Its dimension.
+    pub dimension: Dimension,
+    governing: Governing,
+    /// Figures of one group share a scale: the components of a force, of a displacement, of a stress.
+    group: String,
+    value: Box<dyn Fn(&Observation) -> Value>,
+}
+
+impl fmt::Debug for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} ({:?})", self.name, self.dimension)
+    }
+}
+
+impl Figure {
+    /// Is it an extreme over points, which may be singular or not resolved?
+    pub fn is_extreme(&self) -> bool {
+        self.dimension == Dimension::Stress && self.governing != Governing::LargestModulus
+    }
+
+    /// Is it an extreme of the contact pressure?
+    pub fn is_pressure(&self) -> bool {
+        self.kind == "pressure_max"
+    }
+
+    /// A value as a size of which the largest one is the extreme: its opposite for a minimum.
+    pub fn size(&self, value: f64) -> f64 {
+        if self.governing == Governing::Least { -value } else { value }
+    }
+
+    /// Does a value govern a run with the value `other`? There is none before the first step, nor for places.
+    pub fn governs(&self, value: f64, other: Option<f64>) -> bool {
+        let Some(other) = other else { return self.dimension != Dimension::Place };
+        match self.governing {
+            Governing::Largest => value > other,
+            Governing::Least => value < other,
+            Governing::LargestModulus => value.abs() > other.abs(),
+        }
+    }
+}
+
+/// The parts of a scene of which there are figures, by their names.
+#[derive(Default)]
+pub(crate) struct Parts<'a> {
+    /// Of several materials.
+    pub materials: Vec<&'a str>,
+    /// The boundaries with a table.
+    pub boundaries: Vec<PartOfBoundary<'a>>,
+    pub probes: Vec<&'a str>,
+}
+
+/// A boundary with a table.
+pub(crate) struct PartOfBoundary<'a> {
+    pub name: &'a str,
+    /// Its number among the supports, and among the foundations.
+    pub support: Option<usize>,
+    pub foundation: Option<usize>,
+    /// Does its foundation move?
+    pub moves: bool,
+}
+
+/// The figures of a problem.
+#[derive(Debug, Default)]
+pub struct Figures(Vec<Figure>);
+
+impl Index<usize> for Figures {
+    type Output = Figure;
+
+    fn index(&self, number: usize) -> &Figure {
+        &self.0[number]
+    }
+}
+
+impl Figures {
+    /// The list of all figures.
+    pub(crate) fn new(parts: &Parts) -> Self {
+        use Dimension::{
+            ContactLength, Force, LeastZeta, Length, MeanZeta, Moment, Place, Stress, Work, Zeta,
+        };
+        use Governing::{Largest, LargestModulus, Least};
+        let (mut all, body) = (Self::default(), Of::Body);
+        all.add(&body, [("zeta_min", "least ζ", LeastZeta, Least)], |of, _| of.zeta_min);
+        all.add(&body, [("zeta_mean", "mean ζ", MeanZeta, Least)], |of, _| of.zeta_mean.into());
+        let most = ("displacement_max", "largest displacement", Length, Largest);
+        all.add(&body, [most], |of, _| of.displacement_max);
+        let work = ("work", "work of the loads", Work, LargestModulus);
+        all.add(&body, [work], |of, _| of.work.into());
+        let stresses = [
+            ("von_mises_max", "largest von Mises stress@", Stress, Largest),
+            ("principal_max", "largest σ₁@", Stress, Largest),
+            ("principal_min", "smallest σ₂@", Stress, Least),
+        ];
+        let materials = parts.materials.iter().map(|name| Of::Material((*name).to_owned()));
+        for (i, of) in iter::once(Of::Body).chain(materials).enumerate() {
+            all.add(&of, stresses, move |of, k| of.stresses[i][k]);
+        }
+        let contact = [
+            ("pressure_max", "largest contact pressure@", Stress, Largest),
+            ("contact_length", "length of contact@", ContactLength, Largest),
+        ];
+        if parts.boundaries.iter().any(|of| of.foundation.is_some()) {
+            let force = ("contact_force", "sum of contact reactions", Force, Largest);
+            all.add(&body, [force], |of, _| of.contact_force.into());
+            all.add(&body, contact, |of, k| of.contact[0].values[k]);
+        }
+        for (i, boundary) in parts.boundaries.iter().enumerate() {
+            let of = Of::Boundary(boundary.name.to_owned());
+            if let Some(support) = boundary.support {
+                let resultants = [
+                    ("force_x", "resultant@, x", Force, LargestModulus),
+                    ("force_y", "resultant@, y", Force, LargestModulus),
+                    ("moment", "moment@ about (0, 0)", Moment, LargestModulus),
+                ];
+                all.add(&of, resultants, move |of, k| of.resultants[support][k].into());
+            }
+            let means = [
+                ("u_x", "mean displacement@, x", Length, LargestModulus),
+                ("u_y", "mean displacement@, y", Length, LargestModulus),
+            ];
+            // A probe of the same name has these figures.
+            if !parts.probes.contains(&boundary.name) {
+                all.add(&of, means, move |of, k| of.means[i].displacement[k].into());
+            }
+            if boundary.moves {
+                let travel = ("travel", "travel of the foundation@", Place, LargestModulus);
+                all.add(&of, [travel], move |of, _| of.means[i].travel.into());
+            }
+            if let Some(foundation) = boundary.foundation {
+                all.add(&of, contact, move |of, k| of.contact[1 + foundation].values[k]);
+                let places = [
+                    ("contact_start_x", "first point of contact@, x"),
+                    ("contact_start_y", "first point of contact@, y"),
+                    ("contact_end_x", "last point of contact@, x"),
+                    ("contact_end_y", "last point of contact@, y"),
+                    ("peak_x", "place of the largest pressure@, x"),
+                    ("peak_y", "place of the largest pressure@, y"),
+                    ("acts_at_x", "point on the line of action@, x"),
+                    ("acts_at_y", "point on the line of action@, y"),
+                ];
+                let places = places.map(|(kind, label)| (kind, label, Place, LargestModulus));
+                let value = move |of: &Observation, k: usize| of.contact[1 + foundation].places[k];
+                all.add(&of, places, move |of, k| value(of, k).into());
+            }
+        }
+        for (i, name) in parts.probes.iter().enumerate() {
+            let observed = [
+                ("u_x", "displacement@, x", Length, LargestModulus),
+                ("u_y", "displacement@, y", Length, LargestModulus),
+                ("zeta", "ζ@", Zeta, Least),
+                ("stress_xx", "stress@, xx", Stress, LargestModulus),
+                ("stress_yy", "stress@, yy", Stress, LargestModulus),
+                ("stress_xy", "stress@, xy", Stress, LargestModulus),
+                ("von_mises", "von Mises stress@", Stress, LargestModulus),
+            ];
+            let of = Of::Probe((*name).to_owned());
+            all.add(&of, observed, move |of, k| of.probes[i][k].into());
+        }
+        all
+    }
+
+    /// The figures that a scene may have, with general names of its parts.
+    pub fn of_any_scene() -> Self {
+        let [support, foundation] = [Some(0); 2];
+        let boundary = PartOfBoundary { name: "BOUNDARY", support, foundation, moves: true };
+        Self::new(&Parts {
+            materials: vec!["MATERIAL"],
+            boundaries: vec![boundary],
+            probes: vec!["PROBE"],
+        })
+    }
+
+    /// Adds figures, each with its kind, its label with an @ for the name, its dimension, and what governs. `value` gives that of
+    /// the k-th.
+    fn add<const N: usize>(
+        &mut self,
+        of: &Of,
+        figures: [(&'static str, &str, Dimension, Governing); N],
+        value: impl Fn(&Observation, usize) -> Value + Copy + 'static,
+    ) {
+        for (k, (kind, label, dimension, governing)) in figures.into_iter().enumerate() {
+            let (name, place) = match of {
+                Of::Body => (kind.to_owned(), String::new()),
+                Of::Material(of) => (format!("{of}.{kind}"), format!(" in {of}")),
+                Of::Boundary(of) => (format!("{of}.{kind}"), format!(" of {of}")),
+                Of::Probe(of) => (format!("{of}.{kind}"), format!(" at {of}")),
+            };
+            let group = match (dimension, of, kind) {
+                (Dimension::Force, Of::Boundary(_), _) => "resultants".to_owned(),
+                (Dimension::Length, Of::Boundary(_), _) => "displacement_max".to_owned(),
+                (Dimension::Zeta, ..) => "zeta_min".to_owned(),
+                (Dimension::Length, Of::Probe(of), _) => format!("u at {of}"),
+                (Dimension::Stress, Of::Probe(of), _) => format!("stress at {of}"),
+                (Dimension::Stress, Of::Material(of), _) => format!("stress in {of}"),
+                (Dimension::Stress, Of::Body, kind) if kind != "pressure_max" => {
+                    "stress".to_owned()
+                }
+                _ => kind.to_owned(),
+            };
+            let (of, label) = (of.clone(), label.replace('@', &place));
+            let value = Box::new(move |of: &Observation| value(of, k));
+            self.0.push(Figure { name, kind, of, label, dimension, governing, group, value });
+        }
+    }
+
+    /// The values of all figures.
+    pub(crate) fn values(&self, of: &Observation) -> Vec<Value> {
+        self.0.iter().map(|figure| (figure.value)(of)).collect()
+    }
+
+    /// The extremes of the parts of the body or of Γ_C, if `number` is the same extreme of the whole and there are parts.
+    pub(crate) fn parts(&self, number: usize) -> impl Iterator<Item = usize> {
+        let whole = &self[number];
+        let is_part =
+            |part: &Figure| whole.of == Of::Body && part.of != Of::Body && part.kind == whole.kind;
+        (0..self.0.len()).filter(move |&k| is_part(&self[k]))
+    }
+
+    /// The figures in their order.
+    pub fn iter(&self) -> slice::Iter<'_, Figure> {
+        self.0.iter()
+    }
+
+    /// The number of a figure in the list; `None` if there is no such figure.
+    pub fn number(&self, name: &str) -> Option<usize> {
+        self.0.iter().position(|figure| figure.name == name)
+    }
+}

@@ -1,0 +1,68 @@
+//! The mean displacement of each boundary with a table, and the travel of its foundation.
+
+use super::{DiscreteProblem, State};
+use crate::{
+    fem::{Body, Subdomain},
+    mesh::Lines,
+    scene::Scene,
+};
+use std::collections::BTreeMap;
+
+/// Per boundary with a table: its nodes on this rank, with their tributary lengths ∫φ_i, m.
+#[derive(Debug)]
+pub(super) struct Means(Vec<BTreeMap<usize, f64>>);
+
+/// The motion of a boundary and of its foundation.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct MeanDisplacement {
+    /// ∫u/|Γ| of the boundary Γ, m.
+    pub displacement: [f64; 2],
+    /// ∫(g(x, 0) − g(x, t))/|Γ|: how far the foundation has moved towards the body, m; 0 without one.
+    pub travel: f64,
+}
+
+impl Means {
+    pub(super) fn new(scene: &Scene, body: &Body, lines: &Lines) -> Self {
+        let of_boundary = |name: &String| {
+            let edges = body.mesh.curves.get(name).map(|curve| body.edges(&curve.edges));
+            let mut lengths = BTreeMap::new();
+            for edge in edges.iter().flatten() {
+                for (node, face) in edge.faces(&body.nodes.points, lines) {
+                    *lengths.entry(node).or_insert(0.0) += face.length;
+                }
+            }
+            lengths
+        };
+        Self(scene.boundaries.iter().map(|of| of_boundary(&of.name)).collect())
+    }
+
+    pub(super) fn restrict(&self, subdomain: &Subdomain) -> Self {
+        let own = |(&node, &length): (&usize, &f64)| Some((subdomain.owned(node)?, length));
+        Self(self.0.iter().map(|lengths| lengths.iter().filter_map(own).collect()).collect())
+    }
+}
+
+impl DiscreteProblem {
+    /// The mean displacements of the boundaries with a table. Collective.
+    pub(super) fn mean_displacements(&self, state: &State) -> Vec<MeanDisplacement> {
+        let mut sums = vec![[0.0; 4]; self.means.0.len()];
+        for ((lengths, boundary), sums) in
+            self.means.0.iter().zip(&self.scene.boundaries).zip(&mut sums)
+        {
+            let gap = boundary.gap().filter(|gap| gap.distance.depends_on_time());
+            for (&node, length) in lengths {
+                let [x, y] = self.body.nodes.points[node];
+                let gap = |t: f64| gap.map_or(0.0, |gap| gap.distance.eval(x, y, t));
+                let travel = gap(self.scene.start()) - gap(state.time);
+                let values = [state.u[2 * node], state.u[2 * node + 1], travel, 1.0];
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += length * value);
+            }
+        }
+        self.body.nodes.partition.comm().sum(sums.as_flattened_mut());
+        let mean = |[x, y, travel, length]: [f64; 4]| MeanDisplacement {
+            displacement: [x / length, y / length],
+            travel: travel / length,
+        };
+        sums.into_iter().map(mean).collect()
+    }
+}
