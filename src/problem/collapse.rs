@@ -54,14 +54,14 @@ impl DiscreteProblem {
     /// stays in contact.
     pub fn collapse_on_a_point(&self) -> Option<Collapse> {
         /// Slower motions away from an edge do not open it, relative to the fastest motion.
-        const ALONG: f64 = 0.005;
+        const OPENING: f64 = 0.005;
         /// The contact remains if this part of Γ_C does not open.
         const REMAINS: f64 = 0.1;
         let mesh = self.mesh();
         let motion = self.collapse?.motion;
         let speed = |&[x, y]: &[f64; 2]| x.hypot(y);
         let speeds = mesh.nodes.iter().map(|&node| speed(&motion.at(node)));
-        let slow = ALONG * speeds.fold(0.0, f64::max);
+        let slow = OPENING * speeds.fold(0.0, f64::max);
         let (mut remains, mut all) = (0.0, 0.0);
         for boundary in &self.scene().boundaries {
             let Some(gap) = boundary.gap() else { continue };

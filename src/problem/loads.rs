@@ -7,7 +7,7 @@ mod parts;
 
 pub(crate) use curve::LoadCurve;
 pub(super) use jumps::{jump, near_jumps};
-pub(super) use parts::{centroid, edge_parts, triangle_parts, triangle_point};
+pub(super) use parts::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point};
 
 use super::{
     boundary_conditions::{BoundaryConditions, RowValue},

@@ -127,7 +127,7 @@ impl DiscreteProblem {
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(&conditions.rows);
         let supports = Supports::new(&scene, &body, &conditions, &lines);
-        let norms = (scene.sample_times(notes::TIMES).into_iter())
+        let norms = (scene.sample_times(notes::SAMPLE_TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
         let mut problem = Self {

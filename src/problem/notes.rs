@@ -18,7 +18,7 @@ const OVERLAP: f64 = 1e-9;
 /// A note is given if more than this fraction of a load, a displacement or a damage is missed.
 pub(crate) const NOTED: f64 = 0.05;
 /// Approximate number of sample times of loads, for their maximum, and of what the mesh must resolve.
-pub(super) const TIMES: usize = 8;
+pub(super) const SAMPLE_TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
 
@@ -43,7 +43,7 @@ impl DiscreteProblem {
         let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
         notes.extend(self.contrast().map(check_units));
         notes.extend(unresolved::notes(scene, self.mesh()));
-        notes.extend(self.loads.notes(&scene.sample_times(TIMES)));
+        notes.extend(self.loads.notes(&scene.sample_times(SAMPLE_TIMES)));
         let others = [
             LoadCurve::unresolved_step(self).map(|[start, end]| {
                 format!(

@@ -39,7 +39,7 @@ pub(crate) const SEEN: f64 = 0.02;
 /// Bounds of Re λ and |Im λ|. Above 0.975 a bisection raises the stress by less than [`SEEN`]; λ = 0 is a rigid motion.
 const LAMBDA: [f64; 3] = [0.03, 0.975, 1.5];
 /// Number of parts of each side of this rectangle.
-const PARTS: usize = 48;
+const PARTS_OF_SIDE: usize = 48;
 /// Are stresses singular where sectors (stiffness and angle, rad) meet, with conditions on two sides, or inside the body?
 /// Along half the border of the rectangle the argument of the determinant changes by π times the number of its roots.
 fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2]>) -> bool {
@@ -63,10 +63,10 @@ fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2
         rows.fixed_rows_mut::<2>(2).copy_from(&(last * transfer));
         rows.determinant()
     };
-    let ([least, largest, height], last) = (LAMBDA, 3 * PARTS);
+    let ([least, largest, height], last) = (LAMBDA, 3 * PARTS_OF_SIDE);
     let values = (0..=last).map(|i| {
-        let s = if i == last { 1.0 } else { (i % PARTS) as f64 / PARTS as f64 };
-        determinant(match i / PARTS {
+        let s = if i == last { 1.0 } else { (i % PARTS_OF_SIDE) as f64 / PARTS_OF_SIDE as f64 };
+        determinant(match i / PARTS_OF_SIDE {
             0 => Complex::new(largest, height * s * s),
             1 => Complex::new(largest + (least - largest) * s, height),
             _ => Complex::new(least, height * (1.0 - s).powi(2)),

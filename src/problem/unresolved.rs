@@ -2,8 +2,8 @@
 //! nodes, and may vary more between them.
 
 use super::{
-    loads::{centroid, edge_parts, triangle_parts, triangle_point},
-    notes::{NOTED, TIMES},
+    loads::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point},
+    notes::{NOTED, SAMPLE_TIMES},
 };
 use crate::{
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
@@ -13,11 +13,10 @@ use crate::{
 use std::collections::HashSet;
 
 /// The fraction of the accuracy that the interpolation of the initial damage may take.
-const SHARE: f64 = 0.5;
+const INTERPOLATION_SHARE: f64 = 0.5;
 /// An edge shorter than this fraction of its curve is not halved: the displacement must jump there.
 const SHORTEST: f64 = 1e-4;
-/// Allowed relative error of the integrals, and the number of triangle parts that may be added for it.
-const DEVIATION: f64 = 1e-5;
+/// Maximum number of triangle parts added for the integrals of the initial damage.
 const MAX_ADDED: f64 = 100_000.0;
 
 /// The edges that must be halved for a relative `accuracy`, by their ends in increasing order. The maximum |u| is
@@ -47,7 +46,7 @@ pub(crate) fn unresolved(
         }
     }
     if let Some(damage) = missed_damage(scene, mesh) {
-        let allowed = SHARE * accuracy;
+        let allowed = INTERPOLATION_SHARE * accuracy;
         let mut largest: Vec<_> = damage.squares.iter().copied().enumerate().collect();
         largest.sort_by(|(_, a), (_, b)| b.total_cmp(a));
         let mut rest: f64 = damage.squares.iter().sum();
@@ -116,7 +115,7 @@ fn missed_displacements(
         [p, if scene.order == Order::Linear { midpoint(p, q) } else { mesh.midpoint(*edge) }, q]
     };
     let lines: Vec<_> = curve.edges.iter().map(line).collect();
-    let mut times = scene.sample_times(TIMES);
+    let mut times = scene.sample_times(SAMPLE_TIMES);
     times.truncate(if u.depends_on_time() { usize::MAX } else { 1 });
     let (mut missed, mut largest) = (vec![0.0_f64; lines.len()], 0.0_f64);
     for t in times {

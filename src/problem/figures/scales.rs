@@ -1,7 +1,7 @@
 //! The error bars of figures, and the scales of their relative errors.
 
 use super::{Dimension, Figure, Figures, Of, Value};
-use crate::problem::{DiscreteProblem, notes::TIMES};
+use crate::problem::{DiscreteProblem, notes::SAMPLE_TIMES};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -156,7 +156,7 @@ impl DiscreteProblem {
     /// state.
     pub(crate) fn add_step_errors(&self, bars: &mut [Bar], now: &[f64], of_steps: [f64; 4]) {
         let [force, of_loads] =
-            self.loads.integral_errors(&self.body, &self.scene().sample_times(TIMES));
+            self.loads.integral_errors(&self.body, &self.scene().sample_times(SAMPLE_TIMES));
         let lever =
             self.body.radius_of_gyration() + self.body.centroid[0].hypot(self.body.centroid[1]);
         let [zeta, zeta_min, zeta_mean, displacement] = of_steps;

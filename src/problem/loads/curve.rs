@@ -8,13 +8,13 @@ use crate::{
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
 /// On 12 scenes, with half of it meshes have an eighth more triangles; twice changes little.
-const DEVIATION: f64 = 0.05;
+const NONLINEARITY: f64 = 0.05;
 /// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;
 /// Number of uniform steps sampled for the note about loads within a step.
 const STEPS: usize = 50;
 /// Number of times sampled within a step.
-const POINTS: usize = 16;
+const TIMES_IN_STEP: usize = 16;
 /// Number of parts of a boundary searched for pulses and jumps. One pulse may hide another in the same part.
 const BOXES: usize = 4;
 
@@ -91,13 +91,13 @@ impl<'a> LoadCurve<'a> {
     /// Are loads, prescribed displacements and gaps nearly linear in time from `start` to `end`?
     pub(crate) fn is_nearly_linear(&mut self, start: f64, end: f64) -> bool {
         let deviations = self.deviations(start, end, <[f64]>::to_vec);
-        (0..2).all(|kind| deviations[kind] <= DEVIATION * self.largest[kind])
+        (0..2).all(|kind| deviations[kind] <= NONLINEARITY * self.largest[kind])
     }
 
     /// Deviations of `of`(forces) and `of`(displacements) from straight lines in time: max Σ|·| over the samples.
     fn deviations(&mut self, start: f64, end: f64, of: impl Fn(&[f64]) -> Vec<f64>) -> [f64; 2] {
         let [first, last] = [start, end].map(|time| self.sample(time).map(|values| of(&values)));
-        let parts = (1..=POINTS).map(|point| point as f64 / (POINTS + 1) as f64);
+        let parts = (1..=TIMES_IN_STEP).map(|point| point as f64 / (TIMES_IN_STEP + 1) as f64);
         let breaks = self.breaks(start, end).iter().map(|time| (time - start) / (end - start));
         let mut deviations = [0.0_f64; 2];
         for part in parts.chain(breaks).collect::<Vec<f64>>() {

@@ -13,13 +13,13 @@ use nalgebra::Vector2;
 use std::collections::BTreeMap;
 
 /// Allowed errors of resultants relative to ∫|f|: for assembled surface loads …
-const DEVIATION: f64 = 1e-6;
+const RESULTANT_ERROR: f64 = 1e-6;
 /// … and for surface loads that are only sampled.
 const SAMPLED: f64 = 0.02;
 /// Maximum number of triangle parts added for a body force: one that depends on time, and a constant one.
 const MORE: [f64; 2] = [10_000.0, 50_000.0];
 /// The approximate number of times at which a body force is sampled to divide triangles.
-const TIMES: usize = 4;
+const BODY_FORCE_TIMES: usize = 4;
 /// Maximum number of undivided triangles in which a body force is sampled, and of parts of divided ones.
 const MAX_SAMPLES: usize = 500;
 
@@ -68,7 +68,7 @@ impl SurfaceForce {
 
     /// The parts of its edges for the nodal loads at time t.
     pub(super) fn resolved(&self, t: f64) -> Parts<EdgePart> {
-        self.parts(t, DEVIATION)
+        self.parts(t, RESULTANT_ERROR)
     }
 
     /// Adds the nodal loads at time t.
@@ -86,7 +86,8 @@ impl SurfaceForce {
     }
 
     fn resultant(&self, lines: &[[[f64; 2]; 3]], [cx, cy]: [f64; 2], t: f64) -> [f64; 3] {
-        let parts = edge_parts(lines, self.force.expressions(), t, DEVIATION).parts.into_iter();
+        let parts =
+            edge_parts(lines, self.force.expressions(), t, RESULTANT_ERROR).parts.into_iter();
         let edge = |edge| Edge { ends: [3 * edge, 3 * edge + 2], middle: Some(3 * edge + 1) };
         let (points, parts) = (lines.as_flattened(), parts.map(|(line, part)| (edge(line), part)));
         let mut load = vec![0.0; 2 * points.len()];
@@ -191,7 +192,7 @@ impl BodyForce {
             return None;
         }
         let densities: Vec<f64> = scene.materials().map(|material| material.density).collect();
-        let times = scene.sample_times(TIMES);
+        let times = scene.sample_times(BODY_FORCE_TIMES);
         let in_time = force.iter().any(Expression::depends_on_time);
         let (times, more) = if in_time { (&times[..], MORE[0]) } else { (&times[..1], MORE[1]) };
         let in_space = force.iter().any(Expression::depends_on_space);

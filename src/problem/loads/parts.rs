@@ -25,8 +25,8 @@ pub(crate) type EdgePart = (usize, [f64; 2]);
 /// A part of a triangle: the index of the triangle, and the barycentric coordinates of the part's corners.
 pub(crate) type TrianglePart = (usize, [[f64; 3]; 3]);
 
-/// The allowed deviation in a part of a triangle. An edge has a smaller one: its parts are few.
-const DEVIATION: f64 = 1e-5;
+/// The relative error of an integral that a part of a triangle may cause. Edges of loads have a smaller one.
+pub(crate) const DEVIATION: f64 = 1e-5;
 /// The fraction of ∫|f| that may be hidden in a peak between the sample points.
 const HIDDEN: f64 = 1e-3;
 /// Ends and corners are sampled this far inside, relative to the part, so that no part contains a jump at a node.
