@@ -15,7 +15,7 @@ use crate::{
 
 /// A fixed normal whose cosine with an edge's outward normal is at most this does not point out of
 /// the body: gmsh places nodes to about 1e-8 of an edge.
-const ALONG: f64 = 1e-6;
+const OUTWARD: f64 = 1e-6;
 
 /// The approximate number of evaluations of an expression in space and time before a run. They take less
 /// than a second.
@@ -205,12 +205,12 @@ impl Scene {
             let ([x, y], _) = mesh.edge_normal([from, to]);
             (nx * x + ny * y, [from, to])
         };
-        let wrong = curve.edges.iter().map(cosine).filter(|(cosine, _)| *cosine <= ALONG);
+        let wrong = curve.edges.iter().map(cosine).filter(|(cosine, _)| *cosine <= OUTWARD);
         let (cosine, worst) = wrong.clone().min_by(|(a, _), (b, _)| a.total_cmp(b))?;
         let [x, y] = midpoint(mesh.nodes[worst[0]], mesh.nodes[worst[1]]);
         // Adding 0 turns -0 into 0.
         let [vx, vy] = mesh.edge_normal(worst).0.map(|component| component + 0.0);
-        let how = if cosine < -ALONG { "into the body" } else { "along the boundary" };
+        let how = if cosine < -OUTWARD { "into the body" } else { "along the boundary" };
         let mend = match wrong.count() == curve.edges.len() {
             true => "it must point from the body towards the obstacle",
             false => "restrict the physical curve to where the body faces the obstacle",

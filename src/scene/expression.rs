@@ -13,7 +13,7 @@ use table::Table;
 use toml::Value;
 
 /// The largest allowed length of an expression, bytes. A run evaluates it at many points and times.
-const LONGEST: usize = 20_000;
+const MAX_LENGTH: usize = 20_000;
 /// The deepest allowed nesting, so that parsing cannot exhaust the stack of the program.
 const DEEPEST: usize = 128;
 /// The largest number of values on the stack of an expression. In each level of nesting at most two values

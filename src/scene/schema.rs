@@ -21,7 +21,7 @@ use toml::de::{DeArray, DeTable, DeValue};
 /// key, and `parameters_in` the table that has the parameters of a geometry.
 pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
-static KEYS: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
+static ROOT: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
 
 /// The end of a message about an unknown key: the most similar key, the key with this name `also` in use, or the table
 /// of parameters in which a number may stand.
@@ -59,10 +59,10 @@ impl<'t> Diagnostics<'t> {
     /// Checks the document of `text`: `root` has the places, `document` the values.
     pub(super) fn check(text: &'t SceneText, root: &DeValue, document: &toml::Table) -> Self {
         let mut document = toml::Value::Table(document.clone());
-        complete(&mut document, &KEYS);
+        complete(&mut document, &ROOT);
         let (problems, places, unsound) = Default::default();
         let mut findings = Self { text, document, problems, places, unsound };
-        findings.check_value(String::new(), NOWHERE, root, &KEYS);
+        findings.check_value(String::new(), NOWHERE, root, &ROOT);
         findings
     }
 

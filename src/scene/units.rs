@@ -1,7 +1,7 @@
 //! The names of the units of a scene.
 
 /// Units that are checked, in SI units.
-const LENGTHS: [(&str, f64); 7] = [
+const LENGTH_UNITS: [(&str, f64); 7] = [
     ("µm", 1e-6),
     ("mm", 1e-3),
     ("cm", 1e-2),
@@ -10,9 +10,9 @@ const LENGTHS: [(&str, f64); 7] = [
     ("in", 0.0254),
     ("ft", 0.3048),
 ];
-const FORCES: [(&str, f64); 5] =
+const FORCE_UNITS: [(&str, f64); 5] =
     [("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6), ("lbf", 4.448_222)];
-const STRESSES: [(&str, f64); 7] = [
+const STRESS_UNITS: [(&str, f64); 7] = [
     ("Pa", 1.0),
     ("kPa", 1e3),
     ("MPa", 1e6),
@@ -56,8 +56,8 @@ impl Units {
         let si = |table: &[(&str, f64)], unit: &str| {
             table.iter().find(|(name, _)| *name == unit).map(|(_, si)| *si)
         };
-        let [force, length] = [si(&FORCES, &self.force)?, si(&LENGTHS, &self.length)?];
-        let stress = si(&STRESSES, &self.stress)?;
+        let [force, length] = [si(&FORCE_UNITS, &self.force)?, si(&LENGTH_UNITS, &self.length)?];
+        let stress = si(&STRESS_UNITS, &self.stress)?;
         let ratio = force / (length * length) / stress;
         ((ratio - 1.0).abs() > 1e-3).then(|| {
             format!(

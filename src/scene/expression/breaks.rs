@@ -4,12 +4,12 @@ use super::{Expression, interval::hull};
 
 /// The number of parts of a run whose ends are evaluated first. Adaptive steps find longer events themselves;
 /// this search finds the shorter ones.
-const PARTS: usize = 512;
+const SEARCHED_PARTS: usize = 512;
 /// The smallest change that counts, over the whole range of the expression in the run.
 const CHANGE: f64 = 0.05;
 /// The largest number of intervals that are bisected in one part. A jump takes about 50 down to neighbouring numbers, a
 /// smooth pulse about 100.
-const MAX_BISECTIONS: usize = 400;
+const MAX_BISECTED: usize = 400;
 
 /// A time, s, with the bounds of the expression at it.
 #[derive(Clone, Copy)]
@@ -39,10 +39,10 @@ impl Expression {
         if !self.depends_on_time() {
             return Vec::new();
         }
-        let part = end / PARTS as f64;
+        let part = end / SEARCHED_PARTS as f64;
         let mut envelope = Envelope { expression: self, space, least: 0.0, part };
-        let time = |i: usize| end * i as f64 / PARTS as f64;
-        let knots: Vec<_> = (0..=PARTS).map(time).map(|t| envelope.knot(t)).collect();
+        let time = |i: usize| end * i as f64 / SEARCHED_PARTS as f64;
+        let knots: Vec<_> = (0..=SEARCHED_PARTS).map(time).map(|t| envelope.knot(t)).collect();
         let within = knots.windows(2).map(|pair| envelope.within([pair[0].time, pair[1].time]));
         let all: Vec<_> = within.chain(knots.iter().map(|knot| knot.bounds)).collect();
         let changes = [0, 1].map(|k| {
@@ -53,7 +53,7 @@ impl Expression {
         envelope.least = CHANGE * changes[0].max(changes[1]);
         let mut found = vec![knots[0]];
         for pair in knots.windows(2) {
-            envelope.bisect(pair[0], pair[1], &mut { MAX_BISECTIONS }, &mut found);
+            envelope.bisect(pair[0], pair[1], &mut { MAX_BISECTED }, &mut found);
         }
         envelope.needed(&found)
     }

@@ -3,7 +3,7 @@
 use super::{
     DEEPEST, Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
-    LONGEST, Table, interval, truth,
+    MAX_LENGTH, Table, interval, truth,
 };
 use crate::suggestion::suggestion;
 use std::{
@@ -68,10 +68,10 @@ type Parsed = Result<(), String>;
 impl<'a> Parser<'a> {
     /// The program of `text`.
     pub(super) fn parse(text: &'a str, folder: &'a Path) -> Result<Vec<Instruction>, String> {
-        if text.len() > LONGEST {
+        if text.len() > MAX_LENGTH {
             let length = text.len();
             return Err(format!(
-                "is {length} bytes long, and {LONGEST} are allowed; shorten it, or use table(\"file.csv\")"
+                "is {length} bytes long, and {MAX_LENGTH} are allowed; shorten it, or use table(\"file.csv\")"
             ));
         }
         let mut parser = Self { text, folder, at: 0, depth: 0, program: Vec::new() };
