@@ -13,7 +13,7 @@ use signorini::{
 use std::iter::once;
 
 /// The approximate number of times at which gaps are evaluated.
-const TIMES: usize = 20;
+const SHOWN_TIMES: usize = 20;
 
 /// `signorini check SCENE`: describes mesh, boundaries, loads, support and cost.
 pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
@@ -68,7 +68,7 @@ fn materials(scene: &Scene) -> Vec<String> {
 
 /// A table of the parts of the boundary: those in the scene, and the free rest.
 fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
-    let times = scene.sample_times(TIMES);
+    let times = scene.sample_times(SHOWN_TIMES);
     let mut free = mesh.boundary_edges();
     let measure = format!("length, {}", scene.units.length);
     let row = |name: &str, edges: &[[usize; 2]], conditions: String| {

@@ -5,7 +5,7 @@ use signorini::output::{terminal::say, write_whole};
 use std::path::Path;
 
 const GEOMETRY: &str = include_str!("new.geo");
-const SCENE: &str = include_str!("new.toml");
+const FIRST_SCENE: &str = include_str!("new.toml");
 
 /// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are. NAME may have the ending of
 /// one of the files.
@@ -31,7 +31,7 @@ pub fn new(name: &Path) -> Result<(), Failure> {
         return Err(Failure::input(format!("{there} is there already; give another name")));
     }
     let file = geometry.file_name().unwrap_or_default().to_string_lossy();
-    let text = SCENE.replace("\"new.geo\"", &toml::Value::from(&*file).to_string());
+    let text = FIRST_SCENE.replace("\"new.geo\"", &toml::Value::from(&*file).to_string());
     for (path, text) in [(&geometry, GEOMETRY), (&scene, &text)] {
         write_whole(path, text.as_bytes()).map_err(Failure::input)?;
     }

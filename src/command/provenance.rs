@@ -29,11 +29,11 @@ pub fn provenance(gmsh: Option<&str>) -> Value {
 /// The files of PETSc, of its factors and of BLAS that this process has loaded, from Linux (proc(5), maps). Their
 /// names end with their versions.
 fn libraries() -> Vec<String> {
-    const NAMES: [&str; 5] = ["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"];
+    const LIBRARIES: [&str; 5] = ["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"];
     let maps = fs::read_to_string("/proc/self/maps").unwrap_or_default();
     let files = maps.lines().filter_map(|line| line.rsplit_once('/').map(|(_, file)| file));
     let mut files: Vec<_> =
-        files.filter(|file| NAMES.iter().any(|name| file.starts_with(name))).collect();
+        files.filter(|file| LIBRARIES.iter().any(|name| file.starts_with(name))).collect();
     files.sort_unstable();
     files.dedup();
     files.into_iter().map(str::to_owned).collect()
