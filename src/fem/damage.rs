@@ -220,13 +220,13 @@ impl DamageSystem {
     /// PETSc failed.
     pub fn correction(&mut self, load: &[f64]) -> Result<Option<Vec<f64>>, PetscError> {
         /// ‖k b‖₂ below which the change does not affect ζ, and its energy bᵀ(M + kκL)⁻¹b underflows.
-        const NEGLIGIBLE: f64 = 1e-150;
+        const NEGLIGIBLE_LOAD: f64 = 1e-150;
         let step = self.step;
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r = step * b))?;
         self.unknown.write(|x| x.fill(0.0))?;
         let size = self.rhs.norm()?;
         // Some digits of a correction are enough.
-        let solved = size < NEGLIGIBLE || self.solve(1e-6 * size)?;
+        let solved = size < NEGLIGIBLE_LOAD || self.solve(1e-6 * size)?;
         let correction = self.unknown.read(<[f64]>::to_vec)?;
         Ok(solved.then_some(correction))
     }

@@ -53,7 +53,7 @@ impl RigidMotion {
     /// Whether it is no translation.
     pub fn is_rotation(&self) -> bool {
         let [ax, ay] = self.translation;
-        self.rotation.abs() * self.radius > NEGLIGIBLE * ax.hypot(ay)
+        self.rotation.abs() * self.radius > NEGLIGIBLE_MOTION * ax.hypot(ay)
     }
 
     /// The displacement at a point, m.
@@ -100,7 +100,7 @@ pub fn resultant(body: &Body, force: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
 }
 
 /// Components that move the body less than this, relative, do not count.
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE_MOTION: f64 = 1e-6;
 
 impl fmt::Display for RigidMotion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -113,7 +113,7 @@ impl fmt::Display for RigidMotion {
             let at_rest = place(12_f64.sqrt() * self.radius, at_rest);
             return write!(f, "the rotation about {at_rest}");
         }
-        match [ax, ay].map(|a| a.abs() > NEGLIGIBLE * length) {
+        match [ax, ay].map(|a| a.abs() > NEGLIGIBLE_MOTION * length) {
             [true, false] => write!(f, "the horizontal translation"),
             [false, _] => write!(f, "the vertical translation"),
             _ => write!(f, "the translation along ({:.3}, {:.3})", ax / length, ay / length),

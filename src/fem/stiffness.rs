@@ -29,16 +29,16 @@ struct ElementOperator {
     /// The diagonal entry of fixed unknowns.
     scale: f64,
     /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
-    /// `NOWHERE` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
+    /// `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
     places: Vec<[u32; 2]>,
     /// The places of the entries in rows or columns of fixed unknowns. Is the entry on the diagonal?
     fixed: Vec<(u32, bool)>,
 }
 
 /// The place of a row that is not stored.
-const NOWHERE: [u32; 2] = [u32::MAX; 2];
+const NOT_STORED: [u32; 2] = [u32::MAX; 2];
 /// The entries of a block, row by row.
-const ENTRIES: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
+const BLOCK_ENTRIES: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
 impl Stiffness {
     /// Elements and pattern; the values are those of the undamaged body.
@@ -66,13 +66,13 @@ impl Stiffness {
         let place = |(a, b): (usize, usize)| {
             let position = is_stored(a, b).then(|| pattern.position(a, column(b))).flatten();
             let rows = |position| pattern.rows_of_block(a, position).map(|row| entries[row]);
-            position.map_or(NOWHERE, rows)
+            position.map_or(NOT_STORED, rows)
         };
         let (mut places, mut of_fixed) = (Vec::new(), Vec::new());
         for_elements!(body, cells => for (a, b) in couples(&cells) {
             let rows = place((a, b));
             places.push(rows);
-            for [i, j] in ENTRIES.into_iter().filter(|_| rows != NOWHERE) {
+            for [i, j] in BLOCK_ENTRIES.into_iter().filter(|_| rows != NOT_STORED) {
                 if fixed[2 * a + i] || fixed[2 * b + j] {
                     of_fixed.push((rows[i] + j as u32, a == b && i == j));
                 }
