@@ -22,7 +22,7 @@ const SECONDS_VARIABLE: &str = "SIGNORINI_GMSH_SECONDS";
 /// The interval at which the program checks whether gmsh has ended.
 const POLL: Duration = Duration::from_millis(5);
 /// After this time a message says that gmsh is at work.
-const PATIENCE: Duration = Duration::from_secs(5);
+const NOTE_AFTER: Duration = Duration::from_secs(5);
 
 /// The command that writes gmsh's version, as [`Mesh::gmsh`](crate::mesh::Mesh::gmsh) has it.
 const VERSION: &str =
@@ -114,7 +114,7 @@ fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshErr
         if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
             return Ok(status);
         }
-        if !told && started.elapsed() > PATIENCE {
+        if !told && started.elapsed() > NOTE_AFTER {
             note(input, "gmsh is at work; a larger size is quicker");
             told = true;
         }
