@@ -58,7 +58,7 @@ pub struct Answer<'a> {
 }
 
 /// A normal lies in the span of the prescribed directions if its part outside is below this.
-const ALONG: f64 = 1e-6;
+const IN_SPAN: f64 = 1e-6;
 
 impl Certificate {
     /// The certificate of the undivided body, from its rows.
@@ -199,7 +199,7 @@ impl Conditions {
         // Reactions of prescribed directions balance all forces along them.
         let free: Vec<Vector2<f64>> = match self.fixed.split_first() {
             None => vec![Vector2::x(), Vector2::y()],
-            Some(((d, _), others)) if others.iter().all(|(e, _)| d.perp(e).abs() <= ALONG) => {
+            Some(((d, _), others)) if others.iter().all(|(e, _)| d.perp(e).abs() <= IN_SPAN) => {
                 vec![Vector2::new(-d.y, d.x)]
             }
             Some(_) => vec![],
@@ -208,7 +208,7 @@ impl Conditions {
         let force = project(force);
         let normals: Vec<_> =
             self.gaps.iter().map(|(gap, _)| project(gap.direction.into())).collect();
-        let bears = |i: &usize| normals[*i].norm() > ALONG;
+        let bears = |i: &usize| normals[*i].norm() > IN_SPAN;
         let bearing: Vec<usize> = (0..normals.len()).filter(bears).collect();
         let (multipliers, rest) = cone(force, &normals, &bearing, left);
         let forces = (0..normals.len()).map(|i| bears(&i).then_some(multipliers[i])).collect();
@@ -216,7 +216,7 @@ impl Conditions {
             [] => Vector2::zeros(),
             [first, ..] => {
                 let n = normals[first].normalize();
-                match bearing.iter().all(|&i| n.perp(&normals[i]).abs() <= ALONG) {
+                match bearing.iter().all(|&i| n.perp(&normals[i]).abs() <= IN_SPAN) {
                     true => n * n.dot(&rest),
                     false => rest,
                 }

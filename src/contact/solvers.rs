@@ -170,7 +170,8 @@ pub struct SolverEntry {
 }
 
 /// All contact solvers, the default first.
-pub const REGISTRY: &[SolverEntry] = &[active_set::ENTRY, penalty_duality::ENTRY, tao::ENTRY];
+pub const REGISTRY: &[SolverEntry] =
+    &[active_set::ACTIVE_SET, penalty_duality::PENALTY_DUALITY, tao::TAO];
 
 /// Their names.
 pub const SOLVERS: [&str; REGISTRY.len()] = {

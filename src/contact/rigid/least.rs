@@ -5,7 +5,7 @@ use crate::{contact::Bound, petsc::Communicator};
 use nalgebra::{DMatrix, DVector};
 
 /// u·ν below this fraction of the largest u·ν of a motion is rounding.
-const ROUNDING: f64 = 1e-9;
+const TANGENTIAL: f64 = 1e-9;
 
 /// The amplitude of each rigid motion m_j that moves the answer u, at the bounds `c`, such that
 ///
@@ -26,7 +26,7 @@ pub(crate) fn least_motion(
     let z = DMatrix::from_columns(left);
     let start = z.transpose() * amplitudes;
     let normal = rigid * &z;
-    let cut = ROUNDING * comm.max(normal.amax());
+    let cut = TANGENTIAL * comm.max(normal.amax());
     // Per row: G and h of a bound; for the upper bound −u·ν ≥ c − upper.
     let mut rows = Vec::new();
     for ((row, bound), c) in normal.row_iter().zip(bounds).zip(c) {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// A row is dependent if its part outside the span of the others is below this, relative; and a gradient is zero below
 /// it. Larger values leave motions that contact does not resist.
-const RANK: f64 = 1e-13;
+const DEPENDENT: f64 = 1e-13;
 
 /// The p ≥ 0 that minimises ‖Aᵀp − b‖ (Lawson and Hanson, Solving Least Squares Problems, ch. 23). A has few
 /// columns; at most this number of p_i is positive.
@@ -12,7 +12,7 @@ pub fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
     let rows = a.nrows();
     let mut p = DVector::zeros(rows);
     let mut positive: Vec<usize> = Vec::new();
-    let cut = RANK * b.norm() * a.amax();
+    let cut = DEPENDENT * b.norm() * a.amax();
     for _ in 0..10 * (rows + 1) {
         let gradient = a * (b - a.transpose() * &p);
         let entering = (0..rows)
@@ -26,7 +26,7 @@ pub fn nonnegative(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64> {
             let columns = a.select_rows(&positive).transpose();
             // A row enters only if it is independent of the others. QR decides this: with nalgebra's singular
             // values, which err by up to 1e-4 here, the iteration can cycle.
-            let independent = RANK * columns.amax();
+            let independent = DEPENDENT * columns.amax();
             let qr = columns.qr();
             let r = qr.r();
             if !r.diagonal().iter().all(|pivot| pivot.abs() > independent) {

@@ -10,12 +10,12 @@ use crate::{
 };
 use pivoting::{AtBounds, Pivoting, constrain_rigid_motions, pivot_condensed};
 
-pub(super) const ENTRY: SolverEntry = SolverEntry {
+pub(super) const ACTIVE_SET: SolverEntry = SolverEntry {
     name: "active-set",
     summary: "primal-dual active set method, one linear solve per guess of the active nodes",
     variants: &[],
     rescuer: Some("tao"),
-    construct: |_, _| Box::new(ActiveSet { name: ENTRY.name }),
+    construct: |_, _| Box::new(ActiveSet { name: ACTIVE_SET.name }),
 };
 
 /// With p = f − Kc, the contact force, the conditions of an unknown with an upper bound are

@@ -23,7 +23,7 @@ pub struct Anderson {
 const DEPTH: usize = 10;
 const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.
-const RANK: f64 = 1e-10;
+const SAME_ITERATE: f64 = 1e-10;
 
 /// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far.
 /// Beyond this multiple of a difference the method takes the plain step. Half and twice change nothing; without a limit
@@ -70,7 +70,7 @@ impl Anderson {
         let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
         let (differences, target) = self.condensed(differences, target);
         let svd = differences.svd(true, true);
-        let cut = RANK * svd.singular_values.max();
+        let cut = SAME_ITERATE * svd.singular_values.max();
         let Ok(coefficients) = svd.solve(&target, cut) else { return next };
         if coefficients.amax() > FARTHEST {
             return next;

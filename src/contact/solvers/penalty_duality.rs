@@ -13,7 +13,7 @@ use crate::{
 use omega::estimate_omega;
 use serde::Deserialize;
 
-pub(super) const ENTRY: SolverEntry = SolverEntry {
+pub(super) const PENALTY_DUALITY: SolverEntry = SolverEntry {
     name: "penalty-duality",
     summary: "fixed-point iteration of Bermúdez and Moreno on the contact pressure, accelerated",
     variants: &["plain"],
@@ -128,7 +128,7 @@ impl FixedPoint<'_> {
              allows them) (ω = {omega:.3e})",
             missed / (EXACT * tolerance)
         );
-        Err(ContactError::stopped(ENTRY.name, *report, Kkt::UNKNOWN, detail))
+        Err(ContactError::stopped(PENALTY_DUALITY.name, *report, Kkt::UNKNOWN, detail))
     }
 
     /// ω, estimated in the first solve.
@@ -168,7 +168,7 @@ impl FixedPoint<'_> {
             let forces = problem.bounds.iter().zip(q).zip(start);
             let forces = forces.map(|((bound, q), c)| bound.tributary_length * (q + omega * c));
             let x = condensed.solve_penalised(added, &forces.collect::<Vec<_>>())?;
-            let x = x.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
+            let x = x.ok_or(ContactError::NotDefinite { method: PENALTY_DUALITY.name })?;
             Ok(start.iter().zip(x).map(|(c, x)| c + x).collect())
         };
         let omega = self.omega(problem, &mut respond)?;
@@ -191,7 +191,8 @@ fn solve_condensed(
         let start = problem.at_bounds(c)?;
         report.factorisations += elastic.prepare(system)?;
         let condensed = elastic.condense(system)?;
-        let mut condensed = condensed.ok_or(ContactError::NotDefinite { method: ENTRY.name })?;
+        let mut condensed =
+            condensed.ok_or(ContactError::NotDefinite { method: PENALTY_DUALITY.name })?;
         p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;
         elastic.expand(system, true, c)?;
         report.linear_iterations += 1;
@@ -211,7 +212,7 @@ fn solve_condensed(
         }
     }
     let detail = "the forces that the small problem leaves do not get small enough";
-    Err(ContactError::stopped(ENTRY.name, report, Kkt::UNKNOWN, detail))
+    Err(ContactError::stopped(PENALTY_DUALITY.name, report, Kkt::UNKNOWN, detail))
 }
 
 /// The fixed point with solves of all unknowns.
@@ -249,7 +250,7 @@ fn solve_whole(
         // The linear residual must be below the tolerance of the contact law, or the iteration stalls above
         // it.
         let limit = EXACT * problem.linear_residual();
-        linear.add_solve(ENTRY.name, elastic.solve_renewing(system, &rhs, c, limit)?)?;
+        linear.add_solve(PENALTY_DUALITY.name, elastic.solve_renewing(system, &rhs, c, limit)?)?;
         Ok(problem.at_bounds(c)?)
     };
     let omega = fixed_point.omega(problem, &mut respond)?;
@@ -260,7 +261,7 @@ fn solve_whole(
 
 impl ContactSolver for PenaltyDuality {
     fn name(&self) -> &'static str {
-        ENTRY.name
+        PENALTY_DUALITY.name
     }
 
     fn solve(

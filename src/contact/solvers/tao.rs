@@ -8,7 +8,7 @@ use crate::{
 };
 use std::iter;
 
-pub(super) const ENTRY: SolverEntry = SolverEntry {
+pub(super) const TAO: SolverEntry = SolverEntry {
     name: "tao",
     summary: "PETSc's TAO, trust-region Newton method tron; tao:TYPE for its other types",
     variants: &TAO_TYPES,
@@ -55,7 +55,7 @@ const INFINITE: f64 = f64::MAX / 4.0;
 impl Tao {
     /// The solver's name, with its variant.
     fn method(&self) -> String {
-        format!("{}:{}", ENTRY.name, self.kind)
+        format!("{}:{}", TAO.name, self.kind)
     }
 
     /// Calls TAO from c for K/s + ρI = `stiffness` and U = `unit`, and leaves its answer in c.
@@ -98,7 +98,7 @@ impl Tao {
 
 impl ContactSolver for Tao {
     fn name(&self) -> &'static str {
-        ENTRY.name
+        TAO.name
     }
 
     fn solve(
