@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// Triangles needed to fit at a vertex; with fewer, the fits of its neighbours are averaged.
 /// On 15 scenes, with half of them meshes have half as many triangles again; with twice a bar fails.
-const ENOUGH: usize = 4;
+const TRIANGLES_TO_FIT: usize = 4;
 
 /// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
 pub(crate) type Fit = Matrix6x3<f64>;
@@ -115,7 +115,7 @@ impl Patches {
     /// Are there enough triangles around the vertex, or does it take the mean of few?
     fn has_own_fit(&self, around: &TrianglesAround, vertex: usize) -> bool {
         let count = around.of(vertex).len();
-        count >= ENOUGH || (count > 0 && self.is_near_jump(vertex))
+        count >= TRIANGLES_TO_FIT || (count > 0 && self.is_near_jump(vertex))
     }
 
     /// Per material the fits of the vertices to its strains. `vertices` is the division of the vertices among several ranks.

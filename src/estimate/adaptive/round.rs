@@ -18,7 +18,7 @@ use std::{collections::HashSet, mem::take};
 
 /// A mesh is good enough for a measurement if its estimates are at most this fraction of the required accuracy.
 /// With half of it accuracies are missed, as it is below [`AIM`]; with twice, meshes have up to twice as many triangles.
-const ENOUGH: f64 = 0.8;
+const GOOD_ENOUGH: f64 = 0.8;
 /// If measured errors are too large, a round reduces the estimated errors by at most this factor: excesses on coarse meshes
 /// are often far too large.
 const MIN_GOAL: f64 = 0.25;
@@ -83,7 +83,9 @@ impl<'a> Round<'a> {
         // The errors of figures are products of two estimated errors, see [`Cause::FIGURE`].
         let named = !self.scene.accuracy_of.is_empty();
         let wanted = if named { self.accuracy.sqrt() } else { self.accuracy };
-        self.error <= ENOUGH * wanted && (named || self.open <= ENOUGH) && self.resolves_data()
+        self.error <= GOOD_ENOUGH * wanted
+            && (named || self.open <= GOOD_ENOUGH)
+            && self.resolves_data()
     }
 
     /// Does the mesh resolve the data of the scene? Another mesh may miss a whole peak of a foundation.
@@ -223,7 +225,7 @@ impl<'a> Round<'a> {
                 _ => {}
             }
         }
-        let left = (ENOUGH * ENOUGH - AIM * AIM) * self.accuracy.powi(2);
+        let left = (GOOD_ENOUGH * GOOD_ENOUGH - AIM * AIM) * self.accuracy.powi(2);
         let aim = left / self.singular.len() as f64;
         let singular = self.singular.iter();
         let singular = singular.map(|(at, share)| (*at, halvings(share / aim).max(of_reactions)));
