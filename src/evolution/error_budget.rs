@@ -28,7 +28,7 @@ pub struct ErrorBudget {
 }
 
 /// If all errors are below this, there is no advice.
-const NEGLIGIBLE: f64 = 1e-9;
+const NEGLIGIBLE_ERROR: f64 = 1e-9;
 
 impl ErrorBudget {
     /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of
@@ -70,7 +70,7 @@ impl ErrorBudget {
             false => ("not estimated".to_owned(), 0.0),
         };
         let advice = match mesh.max(steps_most) {
-            largest if largest.max(solver) < NEGLIGIBLE => "",
+            largest if largest.max(solver) < NEGLIGIBLE_ERROR => "",
             largest if solver > largest => "; to improve: the solver's tolerance",
             _ if steps_most > mesh => "; to improve: shorter time steps",
             _ => "; to improve: the mesh",

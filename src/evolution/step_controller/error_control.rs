@@ -34,7 +34,7 @@ pub(super) struct ErrorControl<'a> {
 
 /// The longest step, as a fraction of the run. Half of it takes a quarter more steps; with twice a bar
 /// of six bodies fails.
-const LONGEST: f64 = 0.05;
+const LONGEST_STEP: f64 = 0.05;
 /// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run.
 /// Shorter steps would not follow a jump either.
 const FOLLOWING: f64 = 1.0 / 2000.0;
@@ -46,7 +46,7 @@ const MAX_FORECAST: f64 = 0.1;
 pub const AIM: f64 = 0.7;
 /// One step may add this fraction of the remaining error. Half of it takes up to a third more steps; twice, up to a fifth
 /// fewer …
-const SHARE: f64 = 0.25;
+const STEP_SHARE: f64 = 0.25;
 /// … which is at least this fraction of the aim. Earlier steps may have used it up.
 const MIN_REST: f64 = 1.0 / 16.0;
 
@@ -60,7 +60,7 @@ impl<'a> ErrorControl<'a> {
         let grid = problem.scene().time?;
         let Stepping::Auto { tolerance, expected } = grid.stepping else { return None };
         // The error of the first step is at most half of its damage at its last rate, which lasts for the run.
-        let first_length = (2.0 * SHARE * tolerance).min(LONGEST) * grid.end;
+        let first_length = (2.0 * STEP_SHARE * tolerance).min(LONGEST_STEP) * grid.end;
         let load_curve = LoadCurve::new(problem);
         Some(Self {
             body: &problem.body,
@@ -134,7 +134,7 @@ impl<'a> ErrorControl<'a> {
     }
 
     /// Accepts a step to ζ_n = `zeta` and sets the length of the next step. At the worst node and in the mean, the
-    /// error `added` by the step must be at most SHARE (AIM · tolerance · D − E).
+    /// error `added` by the step must be at most STEP_SHARE (AIM · tolerance · D − E).
     ///
     /// Here E = `error` is the error of the steps before. D is the damage at the end: the expected one, or else the
     /// damage so far plus the [`Forecast`] from the present `rate` = dζ/dt, 1/s. Collective.
@@ -159,7 +159,7 @@ impl<'a> ErrorControl<'a> {
                 _ => damage[j] + forecast,
             };
             let budget = AIM * self.tolerance * reference;
-            added[j] / (SHARE * (budget - error[j]).max(MIN_REST * budget))
+            added[j] / (STEP_SHARE * (budget - error[j]).max(MIN_REST * budget))
         };
         let ratio = ratio(0).max(ratio(1));
         if ratio > 1.0 && self.next_length < f64::INFINITY {
@@ -169,7 +169,7 @@ impl<'a> ErrorControl<'a> {
         let is_followed = |pair: &[f64]| pair[0] == planned.time;
         self.next_length = match self.followed.windows(2).any(is_followed) {
             true => f64::INFINITY,
-            false => (planned.length * growth(ratio).min(2.0)).min(LONGEST * self.end),
+            false => (planned.length * growth(ratio).min(2.0)).min(LONGEST_STEP * self.end),
         };
         Ok(())
     }

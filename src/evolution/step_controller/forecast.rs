@@ -10,7 +10,7 @@ pub(super) struct Forecast {
 }
 
 /// The number of evenly spread times at which loads are sampled, besides the times at which they are not smooth.
-const TIMES: usize = 200;
+const FORECAST_TIMES: usize = 200;
 /// Minimum s² in a forecast: smaller loads say little about the damage by larger ones.
 const SMALL: f64 = 0.01;
 
@@ -19,7 +19,7 @@ impl Forecast {
     pub(super) fn new(curve: Option<&LoadCurve>, end: f64) -> Self {
         let mut times = vec![0.0, end];
         if let Some(curve) = curve {
-            times.extend((1..TIMES).map(|i| end * i as f64 / TIMES as f64));
+            times.extend((1..FORECAST_TIMES).map(|i| end * i as f64 / FORECAST_TIMES as f64));
             times.extend(curve.breaks(0.0, end));
             times.sort_by(f64::total_cmp);
         }
