@@ -200,7 +200,7 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     let limit = "a repetition with shorter steps would take longer than --max-seconds".to_owned();
     let limit = (!is_last).then_some(limit);
     let missing = missing_bars(task, outcome);
-    let reasons = missed.into_iter().chain(adapted.short.clone()).chain(unconfirmed);
+    let reasons = missed.into_iter().chain(adapted.not_reached.clone()).chain(unconfirmed);
     let reasons = reasons.chain(limit).chain(missing);
     let reasons: Vec<String> = reasons.collect();
     let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };

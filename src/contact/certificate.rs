@@ -1,9 +1,9 @@
-//! Certifies an answer in global coordinates, by the conditions as they were posed.
+//! Certifies an answer in global coordinates, by the conditions of the scene.
 //!
 //! This code shares nothing with the solvers: no nodal basis, no bound on an unknown, no mask of prescribed
 //! unknowns. A fault in any of these makes u wrong, and the certificate shows it.
 
-use super::{Kkt, Row, Scales, kkt::worse};
+use super::{Kkt, NodalConstraint, Scales, kkt::worse};
 use crate::{ROUNDING, fem::Subdomain, petsc::Communicator};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 pub struct Certificate {
     nodes: Vec<Conditions>,
     /// Conditions of the whole body.
-    posed: usize,
+    count: usize,
 }
 
 /// The conditions at a node.
@@ -24,7 +24,7 @@ struct Conditions {
     /// Directions d in which u·d is prescribed, and the numbers of these rows.
     fixed: Vec<(Vector2<f64>, usize)>,
     /// The gap conditions and the numbers of these rows.
-    gaps: Vec<(Row, usize)>,
+    gaps: Vec<(NodalConstraint, usize)>,
 }
 
 /// A gap condition at a node, with its gap and reaction.
@@ -62,7 +62,7 @@ const IN_SPAN: f64 = 1e-6;
 
 impl Certificate {
     /// The certificate of the undivided body, from its rows.
-    pub fn new(rows: &[Row]) -> Self {
+    pub fn new(rows: &[NodalConstraint]) -> Self {
         let mut nodes = BTreeMap::<usize, Conditions>::new();
         for (number, row) in rows.iter().enumerate() {
             let at = nodes.entry(row.node).or_default();
@@ -72,20 +72,21 @@ impl Certificate {
             }
         }
         let nodes = nodes.into_iter().map(|(node, at)| Conditions { node, ..at }).collect();
-        Self { nodes, posed: rows.len() }
+        Self { nodes, count: rows.len() }
     }
 
     /// The conditions at the nodes that a rank owns.
     pub fn restrict(&self, subdomain: &Subdomain) -> Self {
         let local = |at: &Conditions| {
             let node = subdomain.owned(at.node)?;
-            let gaps = at.gaps.iter().map(|&(gap, number)| (Row { node, ..gap }, number));
+            let gaps =
+                at.gaps.iter().map(|&(gap, number)| (NodalConstraint { node, ..gap }, number));
             let gaps = gaps.collect();
             Some(Conditions { node, gaps, fixed: at.fixed.clone() })
         };
         let mut nodes: Vec<_> = self.nodes.iter().filter_map(local).collect();
         nodes.sort_by_key(|at| at.node);
-        Self { nodes, posed: self.posed }
+        Self { nodes, count: self.count }
     }
 
     /// The residuals of an answer at the nodes `0..owned`, and its gap conditions. Collective.
@@ -139,7 +140,7 @@ impl Certificate {
         let checked: usize = self.nodes.iter().map(|at| at.fixed.len() + at.gaps.len()).sum();
         let mut sums = [stationarity, dual, checked as f64];
         comm.sum(&mut sums);
-        if sums[2] as usize != self.posed {
+        if sums[2] as usize != self.count {
             return (Kkt::UNKNOWN, points);
         }
         let kkt = Kkt {
@@ -187,7 +188,7 @@ impl Conditions {
     /// g − u·ν of each gap condition. The rigid part is subtracted first: it is as large as a large gap.
     fn gaps_left(&self, answer: Answer) -> Vec<f64> {
         let (rigid, elastic) = (self.rigid(answer), vector(answer.elastic, self.node));
-        let left = |(gap, number): &(Row, usize)| {
+        let left = |(gap, number): &(NodalConstraint, usize)| {
             let normal = Vector2::from(gap.direction);
             (answer.values[*number] - normal.dot(&rigid)) - normal.dot(&elastic)
         };

@@ -1,6 +1,6 @@
 //! From directions and values at nodes to nodal bases, prescribed unknowns and bounds.
 
-use super::{Bound, Conflict, ConstraintError, Row};
+use super::{Bound, Conflict, ConstraintError, NodalConstraint};
 use crate::{
     ROUNDING,
     fem::{NodalBases, Subdomain},
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 pub struct Constraints {
     /// The nodal bases; prescribed unknowns are fixed there (and later the pins of free motions).
     pub bases: NodalBases,
-    /// The bounded unknowns in increasing order, each with its first gap condition. [`Self::pose`] adds the
+    /// The bounded unknowns in increasing order, each with its first gap condition. [`Self::prescribed_and_bounds`] adds the
     /// others.
     pub bounds: Vec<Bound>,
     /// The numbers of the rows of these conditions.
@@ -22,7 +22,7 @@ pub struct Constraints {
     /// Prescribed unknowns, each with the number of its row.
     prescribed: Vec<(usize, usize)>,
     /// Rows in directions that other rows prescribe already, with their numbers.
-    implied: Vec<(Row, usize)>,
+    implied: Vec<(NodalConstraint, usize)>,
     further: Vec<FurtherGap>,
     /// The number of all rows that prescribe a displacement; they come first.
     prescribed_rows: usize,
@@ -32,7 +32,7 @@ pub struct Constraints {
 /// prescribed unknowns of the node.
 #[derive(Debug, Clone, Copy)]
 struct FurtherGap {
-    row: Row,
+    row: NodalConstraint,
     number: usize,
     /// The unknown c, which has a bound from another gap condition, and b; `None` if u·ν is prescribed.
     bounded: Option<(usize, f64)>,
@@ -50,7 +50,7 @@ impl Constraints {
     /// Directions at a node are nearly dependent, or too many for its two unknowns.
     pub fn new(
         coordinates: &[[f64; 2]],
-        rows: &mut [Row],
+        rows: &mut [NodalConstraint],
         values: &[f64],
     ) -> Result<Self, ConstraintError> {
         let mut nodes: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -82,7 +82,7 @@ impl Constraints {
     }
 
     /// Prescribes unknowns of a node in the first independent directions, and returns these.
-    fn prescribe(&mut self, numbers: &[usize], rows: &[Row]) -> Vec<[f64; 2]> {
+    fn prescribe(&mut self, numbers: &[usize], rows: &[NodalConstraint]) -> Vec<[f64; 2]> {
         let mut basis: Vec<[f64; 2]> = Vec::new();
         for &number in numbers {
             let (d, dof) = (rows[number].direction, 2 * rows[number].node + basis.len());
@@ -101,7 +101,7 @@ impl Constraints {
     /// against an earlier normal (a node between two plates) bounds the same unknown.
     fn add_gap(
         &mut self,
-        (number, gap, value): (usize, &mut Row, f64),
+        (number, gap, value): (usize, &mut NodalConstraint, f64),
         basis: &mut Vec<[f64; 2]>,
         prescribed: usize,
     ) -> Result<(), Conflict> {
@@ -169,22 +169,22 @@ impl Constraints {
     /// # Errors
     /// Values contradict each other or go through the obstacle, or the obstacles on both sides of a
     /// node overlap.
-    pub fn pose(
+    pub fn prescribed_and_bounds(
         &self,
         values: &[f64],
         coordinates: &[[f64; 2]],
     ) -> Result<(Vec<f64>, Vec<Bound>), ConstraintError> {
-        let mut lift = vec![0.0; 2 * coordinates.len()];
-        self.prescribed.iter().for_each(|&(dof, row)| lift[dof] = values[row]);
+        let mut c_prescribed = vec![0.0; 2 * coordinates.len()];
+        self.prescribed.iter().for_each(|&(dof, row)| c_prescribed[dof] = values[row]);
         let along = |node: usize, [x, y]: [f64; 2]| {
-            let c = Vector2::new(lift[2 * node], lift[2 * node + 1]);
+            let c = Vector2::new(c_prescribed[2 * node], c_prescribed[2 * node + 1]);
             let u = self.bases.inverse(node).map_or(c, |inverse| inverse * c);
             u.x * x + u.y * y
         };
         let error = |node: usize, conflict| ConstraintError { at: coordinates[node], conflict };
         let prescribed = &values[..self.prescribed_rows];
         let largest = || prescribed.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-        for &(Row { node, direction, .. }, number) in &self.implied {
+        for &(NodalConstraint { node, direction, .. }, number) in &self.implied {
             let values = [along(node, direction), values[number]];
             if (values[0] - values[1]).abs() > ROUNDING * largest() {
                 return Err(error(node, Conflict::Contradicts { values, direction }));
@@ -216,7 +216,7 @@ impl Constraints {
             }
             *lower = lower.min(*upper);
         }
-        Ok((lift, bounds))
+        Ok((c_prescribed, bounds))
     }
 
     /// The conditions of a rank: prescribed unknowns of its subdomain, and the other conditions of its owned
@@ -234,10 +234,11 @@ impl Constraints {
         let (bounds, first) = bounds.into_iter().unzip();
         let prescribed =
             |&(dof, row): &(usize, usize)| Some((renumbered(dof, subdomain.local(dof / 2)?), row));
-        let implied =
-            |&(row, number): &(Row, usize)| Some((Row { node: owned(row.node)?, ..row }, number));
+        let implied = |&(row, number): &(NodalConstraint, usize)| {
+            Some((NodalConstraint { node: owned(row.node)?, ..row }, number))
+        };
         let further = |&FurtherGap { row, number, bounded }: &FurtherGap| {
-            let row = Row { node: owned(row.node)?, ..row };
+            let row = NodalConstraint { node: owned(row.node)?, ..row };
             let bounded = bounded.map(|(dof, b)| (renumbered(dof, row.node), b));
             Some(FurtherGap { row, number, bounded })
         };

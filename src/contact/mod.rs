@@ -15,17 +15,17 @@ mod error;
 mod kkt;
 mod problem;
 mod rigid;
-mod rows;
+mod nodal_constraint;
 mod solvers;
 
 pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::Constraints;
 pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
+pub use nodal_constraint::{Bound, NodalConstraint};
 pub use problem::ContactProblem;
 pub use rigid::{DrivenMotion, RigidMotions, nonnegative};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};
-pub use rows::{Bound, Row};
 pub use solvers::{
     Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PREFIX as ELASTIC,
     PenaltyOptions, REGISTRY, SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers,

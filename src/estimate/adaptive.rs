@@ -64,7 +64,7 @@ pub struct Adapted {
     /// The maximum measured relative error and its name, once it is measured.
     pub worst: Option<(String, f64)>,
     /// The reason why the accuracy was not reached, if it was not.
-    pub short: Option<String>,
+    pub not_reached: Option<String>,
 }
 
 /// The errors from the mesh, as measured on a finer one; empty if they are not measured.
@@ -145,9 +145,12 @@ pub fn adapted(
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
-    let mut few = scene.clone();
-    few.time.iter_mut().for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
-    let scene = with_passing_loads(session, few, &mesh, accuracy)?;
+    let mut few_steps = scene.clone();
+    few_steps
+        .time
+        .iter_mut()
+        .for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
+    let scene = with_passing_loads(session, few_steps, &mesh, accuracy)?;
     let mut reached = None;
     let refined = refined(session, scene, mesh, solver, accuracy, &mut |mesh| {
         seen(mesh);
@@ -156,7 +159,9 @@ pub fn adapted(
     match (refined, reached) {
         (Err(error @ AdaptError::Setup(_)), _) => Err(error),
         (Err(error), _) if error.signal().is_some() => Err(error),
-        (Err(error), Some(before)) => Ok(Adapted { short: Some(error.to_string()), ..before }),
+        (Err(error), Some(before)) => {
+            Ok(Adapted { not_reached: Some(error.to_string()), ..before })
+        }
         (refined, _) => refined,
     }
 }
@@ -193,8 +198,8 @@ pub fn measured_errors(
     solver: &str,
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
-    let mut few = scene.clone();
-    if let Some(grid) = &mut few.time {
+    let mut few_steps = scene.clone();
+    if let Some(grid) = &mut few_steps.time {
         grid.stepping = match (of_steps, grid.stepping) {
             (Some(tolerance), _) => Stepping::Auto { tolerance, expected: [0.0; 2] },
             (None, Stepping::Uniform { steps }) => Stepping::Uniform { steps: steps.min(INSTANTS) },
@@ -202,18 +207,18 @@ pub fn measured_errors(
         };
     }
     if of_steps.is_none() {
-        few = with_passing_loads(session, few, mesh, FEW_STEP_TOLERANCE)?;
+        few_steps = with_passing_loads(session, few_steps, mesh, FEW_STEP_TOLERANCE)?;
     }
     let mesh = Refinement::start(mesh.clone()).mesh;
     let mut limits = Limits::new(session.comm(), scene);
     let triangles = mesh.triangles.len();
     loop {
-        let problem = DiscreteProblem::new(few.clone(), mesh.clone())?.restrict(session)?;
+        let problem = DiscreteProblem::new(few_steps.clone(), mesh.clone())?.restrict(session)?;
         let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, &[]);
         let run = limits.measure(triangles, run);
         let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
-        if !repeats || !make_steps_adaptive(&mut few, FEW_STEP_TOLERANCE) {
+        if !repeats || !make_steps_adaptive(&mut few_steps, FEW_STEP_TOLERANCE) {
             let new = Measurement::new(session, &mesh, &run, solver, &[], None, &mut limits);
             return Ok(new?.result());
         }
@@ -269,26 +274,26 @@ fn refined(
         };
         let errors = measured.as_ref().map_or_else(Vec::new, |of| of.errors(&scene.accuracy_of));
         let limit = || "the limit on rounds is reached".to_owned();
-        let grown = measured.as_ref().and_then(|of| of.without_accuracy(&scene.accuracy_of));
+        let unsettled = measured.as_ref().and_then(|of| of.without_accuracy(&scene.accuracy_of));
         let within = errors.first().is_some_and(|worst| worst.excess(accuracy) <= 1.0);
-        let reached = within && grown.is_none();
-        let mut short = failed.or(grown).or_else(|| progress.stuck(&errors));
-        short = short.or((rounds >= MAX_ROUNDS).then(limit)).filter(|_| !reached);
+        let reached = within && unsettled.is_none();
+        let mut not_reached = failed.or(unsettled).or_else(|| progress.stuck(&errors));
+        not_reached = not_reached.or((rounds >= MAX_ROUNDS).then(limit)).filter(|_| !reached);
         let mut next = None;
-        if !reached && short.is_none() {
+        if !reached && not_reached.is_none() {
             match round.refined(&refinement, measured.as_ref()) {
                 Ok(finer) => {
                     let triangles = finer.mesh.triangles.len();
-                    short = limits.exceeded(&[triangles, 4 * triangles]);
-                    next = short.is_none().then_some(finer);
+                    not_reached = limits.exceeded(&[triangles, 4 * triangles]);
+                    next = not_reached.is_none().then_some(finer);
                 }
-                Err(error) => short = Some(error.to_string()),
+                Err(error) => not_reached = Some(error.to_string()),
             }
         }
-        if short.is_some() && !is_enough {
+        if not_reached.is_some() && !is_enough {
             measured = measure(&mut progress, &mut limits)?.ok();
         }
-        let adapted = round.adapted(measured.as_ref(), rounds, short);
+        let adapted = round.adapted(measured.as_ref(), rounds, not_reached);
         seen(&adapted);
         let level = Level::new(&round.run, mesh.clone());
         match next {

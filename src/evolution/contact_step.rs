@@ -246,7 +246,8 @@ impl<'a> ContactStep<'a> {
         let constraints = &problem.constraints;
         self.next = self.accepted.clone();
         let AcceptedState { reference, active, .. } = &mut self.next;
-        let unloaded = comm.all(case.load.iter().chain(&case.lift).all(|&value| value == 0.0));
+        let unloaded =
+            comm.all(case.load.iter().chain(&case.c_prescribed).all(|&value| value == 0.0));
         if unloaded {
             *reference = Reference::default();
         }
@@ -268,7 +269,8 @@ impl<'a> ContactStep<'a> {
 
     /// The bounds, measured from the reference, and c there.
     fn at_bounds(&self, case: &LoadCase) -> Result<(Vec<Bound>, Vec<f64>), PetscError> {
-        let (_, bounds) = self.next.reference.pose(&self.problem.constraints, case);
+        let (_, bounds) =
+            self.next.reference.prescribed_and_bounds(&self.problem.constraints, case);
         let c = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
         Ok((bounds, c))
     }

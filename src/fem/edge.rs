@@ -2,7 +2,7 @@
 
 use crate::{
     ROUNDING,
-    mesh::{Face, Lines},
+    mesh::{BoundaryFace, Lines},
 };
 use std::{array, collections::BTreeMap};
 
@@ -41,7 +41,7 @@ pub fn parabola<const D: usize>([p, m, q]: [[f64; D]; 3], s: f64) -> [f64; D] {
 /// points of a circle that subtend 2φ errs by φ³/4 at its ends, so two meet at twice this angle. A line that turns by
 /// more than twice that angle is no smooth curve.
 pub fn normal_error(edges: &[Edge], points: &[[f64; 2]], lines: &Lines) -> f64 {
-    let mut faces = BTreeMap::<usize, Vec<(Face, f64)>>::new();
+    let mut faces = BTreeMap::<usize, Vec<(BoundaryFace, f64)>>::new();
     let mut largest = 0.0_f64;
     for edge in edges.iter().filter(|edge| edge.is_curved(points)) {
         let [[a, b], [c, d]] = [0.0, 1.0].map(|s| edge.tangent(points, s));
@@ -102,18 +102,22 @@ impl Edge {
 
     /// The nodes of an edge of the boundary, whose lines are `lines`, each with its outward normals and its tributary
     /// length ∫ φ_i: half of the edge for P1; for P2 1/6 of it at the ends and 4/6 in the middle (Simpson's rule).
-    pub fn faces(&self, points: &[[f64; 2]], lines: &Lines) -> impl Iterator<Item = (usize, Face)> {
+    pub fn faces(
+        &self,
+        points: &[[f64; 2]],
+        lines: &Lines,
+    ) -> impl Iterator<Item = (usize, BoundaryFace)> {
         let [a, b] = self.ends;
         let face = |s: f64, part: f64| {
             let [x, y] = self.tangent(points, s);
             let length = x.hypot(y);
-            Face::plane([y / length, -x / length], part * length)
+            BoundaryFace::plane([y / length, -x / length], part * length)
         };
         let end = |part: f64| {
             let ([x, y], [to_x, to_y]) = (lines.tangent(a, b), lines.tangent(b, a));
             [
-                Some((a, Face { of_line: [y, -x], ..face(0.0, part) })),
-                Some((b, Face { of_line: [-to_y, to_x], ..face(1.0, part) })),
+                Some((a, BoundaryFace { of_line: [y, -x], ..face(0.0, part) })),
+                Some((b, BoundaryFace { of_line: [-to_y, to_x], ..face(1.0, part) })),
             ]
         };
         let (ends, middle) = match self.middle {

@@ -3,7 +3,7 @@
 //! - In: the matrices of one kind, K(ζ) or M + kκL, one after the other, and once the unknowns that may be
 //!   prescribed ([`Factor::set_condensed`]).
 //! - Out: z = B r with a symmetric positive definite B near A⁻¹ ([`Factor::apply`]); the two halves of an
-//!   exact solve, between which a contact solver chooses the prescribed unknowns ([`Condensed`]); and the
+//!   exact solve, between which a contact solver chooses the prescribed unknowns ([`CondensedSystem`]); and the
 //!   number of iterations after which a new factor costs less than the old one.
 //! - Callers: [`LinearSolver`](super::LinearSolver), which has one and lets KSP apply it, and TAO's Newton steps.
 //!
@@ -16,10 +16,10 @@ mod condensed;
 pub use checkpoint::FactorState;
 
 use super::{
-    Condensed, Precision, Reduction, RefactorisationPolicy, scaling::Scaling,
+    CondensedSystem, Precision, Reduction, RefactorisationPolicy, scaling::Scaling,
     substructure::Substructure,
 };
-use crate::petsc::{Communicator, KeptPreconditioner, Matrix, PetscError, Session, Vector};
+use crate::petsc::{Communicator, Matrix, PetscError, Session, ShellPreconditioner, Vector};
 use std::mem::take;
 
 /// A Cholesky factor: CHOLMOD's with our own solves. With several ranks or with contact it uses
@@ -191,7 +191,7 @@ impl Factor {
     ///
     /// # Errors
     /// As in [`Self::apply`].
-    pub(super) fn condense(&mut self, r: &Vector) -> Result<Condensed<'_>, PetscError> {
+    pub(super) fn condense(&mut self, r: &Vector) -> Result<CondensedSystem<'_>, PetscError> {
         self.start_application(r)?;
         let Self { scaling, condensed: (_, condensed), substructure, .. } = self;
         let Some((_, Some(factor))) = substructure else { return Err(missing()) };
@@ -243,7 +243,7 @@ fn missing() -> PetscError {
     PetscError::ours("a factor is applied that was not made for such vectors")
 }
 
-impl KeptPreconditioner for Factor {
+impl ShellPreconditioner for Factor {
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         self.factorise(matrix)
     }

@@ -2,9 +2,9 @@
 
 mod preconditioner;
 
-use super::{Condensed, Factor, LinearSystem, PhaseNames, Precision, Reduction};
+use super::{CondensedSystem, Factor, LinearSystem, PhaseNames, Precision, Reduction};
 use crate::petsc::{Ksp, KspProblem, Matrix, PetscError, Session, Vector};
-use preconditioner::Booked;
+use preconditioner::TimedFactor;
 use std::mem::take;
 
 /// A KSP, by default conjugate gradients with a [`Factor`] of this matrix or of an earlier one. PETSc options
@@ -173,7 +173,10 @@ impl LinearSolver {
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn condense(&mut self, system: LinearSystem) -> Result<Option<Condensed<'_>>, PetscError> {
+    pub fn condense(
+        &mut self,
+        system: LinearSystem,
+    ) -> Result<Option<CondensedSystem<'_>>, PetscError> {
         if !self.factor.exists() {
             return Ok(None);
         }
@@ -265,8 +268,8 @@ impl LinearSolver {
             None => (system.matrix, &self.residual),
         };
         let problem = KspProblem { matrix, prescribed: system.prescribed, limit, most };
-        let mut kept = Booked { factor: &mut self.factor, first, system };
-        let solved = self.ksp.solve(&problem, &mut kept, b, &mut self.correction)?;
+        let mut own = TimedFactor { factor: &mut self.factor, first, system };
+        let solved = self.ksp.solve(&problem, &mut own, b, &mut self.correction)?;
         self.norm = solved.norm;
         if self.modified.is_some() {
             self.correction.write(clear)?;

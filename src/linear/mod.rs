@@ -13,7 +13,7 @@
 //! - If Γ is too large, or PETSc options choose it, a preconditioner of PETSc replaces the factor ([`Factor`]).
 //!
 //! What crosses the door: a [`LinearSystem`] and the largest residual of its solution. Contact solvers also
-//! get the small problem of the unknowns that may be prescribed ([`Condensed`]). They solve it by their own
+//! get the small problem of the unknowns that may be prescribed ([`CondensedSystem`]). They solve it by their own
 //! methods.
 //!
 //! Unsafe code is where CHOLMOD and LAPACK are called, in `cholmod.rs` and `dense.rs`.
@@ -45,4 +45,4 @@ pub use linear_solver::{LinearSolver, SolveReport};
 pub use linear_system::{LinearSystem, PhaseNames};
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::{Reduction, RefactorisationPolicy};
-pub use schur::Condensed;
+pub use schur::CondensedSystem;

@@ -3,7 +3,7 @@
 //! - In: S, from the substructure; prescribed unknowns and penalties, from a contact solver.
 //! - Out: the unknowns of Γ and, where they are prescribed, the forces that hold them.
 //! - Callers: [`Substructure`](super::substructure::Substructure), and the active-set and penalty-duality solvers by
-//!   way of [`Condensed`]. They solve with S for many prescribed sets, and only S is factorised anew for them.
+//!   way of [`CondensedSystem`]. They solve with S for many prescribed sets, and only S is factorised anew for them.
 
 use super::dense::DenseCholesky;
 use crate::petsc::{Communicator, PetscError};
@@ -129,7 +129,7 @@ impl SchurComplement {
 ///
 /// If the factor is that of an earlier matrix A₀, then E^-½ A₀ E^-½ replaces the present matrix
 /// ([`Factor`](super::Factor)). With e = E^½, x = e x₀ and p = p₀/e for the unknowns x₀ and forces p₀ of A₀.
-pub struct Condensed<'a> {
+pub struct CondensedSystem<'a> {
     pub(super) schur: &'a mut SchurComplement,
     /// The places of this rank's condensed unknowns.
     pub(super) own: Vec<usize>,
@@ -140,7 +140,7 @@ pub struct Condensed<'a> {
     pub(super) x: &'a mut [f64],
 }
 
-impl Condensed<'_> {
+impl CondensedSystem<'_> {
     /// The condensed unknowns x of this rank and the forces p there, if some are `prescribed`. `None` if the
     /// rest is not positive definite. Collective.
     ///

@@ -20,7 +20,7 @@
 use super::{
     Cholesky, LowerTriangle, Precision,
     cholesky::BYTES_PER_OPERATION,
-    schur::{Condensed, SchurComplement},
+    schur::{CondensedSystem, SchurComplement},
 };
 use crate::petsc::{Communicator, Matrix, PetscError};
 use nalgebra::DMatrix;
@@ -172,12 +172,12 @@ impl Substructure {
         r: &[f64],
         condensed: &[usize],
         scaling: Vec<f64>,
-    ) -> Condensed<'_> {
+    ) -> CondensedSystem<'_> {
         self.eliminate(r);
         let Self { division, schur, vectors: [b, x], .. } = self;
         let shared = division.shared();
         let own = condensed.iter().map(|&i| division.places[i] - shared).collect();
-        Condensed { schur, own, scaling, b: &b[shared..], x: &mut x[shared..] }
+        CondensedSystem { schur, own, scaling, b: &b[shared..], x: &mut x[shared..] }
     }
 
     /// `z` ← the solution for the last x of the interface. Collective.

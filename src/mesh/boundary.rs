@@ -10,14 +10,13 @@ pub const SAME_DIRECTION: f64 = 1e-4;
 pub struct BoundaryNode {
     /// Index of the node in the mesh.
     pub node: usize,
-    /// The sides on which the node is constrained: one, or two at a corner. (More only
-    /// where parts of the body touch in a point.)
-    pub faces: Vec<Face>,
+    /// Its faces: one, or two at a corner. (More only where parts of the body touch in a point.)
+    pub faces: Vec<BoundaryFace>,
 }
 
-/// One constraint direction of a boundary node.
+/// The boundary at a node as a plane face: its normal and its tributary length. A corner has two.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Face {
+pub struct BoundaryFace {
     /// Outward unit normal.
     pub normal: [f64; 2],
     /// A vector normal to the boundary that the mesh approximates. Where this is smooth, both edges have the same one.
@@ -26,8 +25,8 @@ pub struct Face {
     pub length: f64,
 }
 
-impl Face {
-    /// A face of a plane with this unit normal.
+impl BoundaryFace {
+    /// A face with this unit normal on a plane boundary.
     pub fn plane(normal: [f64; 2], length: f64) -> Self {
         Self { normal, of_line: normal, length }
     }
@@ -61,9 +60,9 @@ fn angle([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
 ///
 /// A node's normal is the length-weighted mean of its edges' normals. At a corner of the boundary the node keeps both. The
 /// sum of the lengths of all faces is the length of the edges.
-pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<BoundaryNode> {
+pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, BoundaryFace)>) -> Vec<BoundaryNode> {
     let nodes = joined_faces(faces.into_iter().map(|(node, face)| (node, face, ())));
-    let node = |(node, faces): (usize, Vec<(Face, Vec<()>)>)| BoundaryNode {
+    let node = |(node, faces): (usize, Vec<(BoundaryFace, Vec<()>)>)| BoundaryNode {
         node,
         faces: faces.into_iter().map(|(face, _)| face).collect(),
     };
@@ -72,9 +71,9 @@ pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, Face)>) -> Vec<Bou
 
 /// Joins the `faces` of each node that continue each other smoothly. Each face gets the `T` of its parts.
 pub fn joined_faces<T>(
-    faces: impl IntoIterator<Item = (usize, Face, T)>,
-) -> BTreeMap<usize, Vec<(Face, Vec<T>)>> {
-    let mut nodes: BTreeMap<usize, Vec<(Face, Vec<T>)>> = BTreeMap::new();
+    faces: impl IntoIterator<Item = (usize, BoundaryFace, T)>,
+) -> BTreeMap<usize, Vec<(BoundaryFace, Vec<T>)>> {
+    let mut nodes: BTreeMap<usize, Vec<(BoundaryFace, Vec<T>)>> = BTreeMap::new();
     for (node, own, of_own) in faces {
         let faces = nodes.entry(node).or_default();
         match faces.iter_mut().find(|(face, _)| face.continues(&own)) {

@@ -20,7 +20,7 @@ mod quadratic;
 mod rectangle;
 mod refine;
 
-pub use boundary::{BoundaryNode, Face, SAME_DIRECTION, boundary_nodes, joined_faces};
+pub use boundary::{BoundaryFace, BoundaryNode, SAME_DIRECTION, boundary_nodes, joined_faces};
 pub use error::MeshError;
 pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
 pub(crate) use lines::CHORDS;

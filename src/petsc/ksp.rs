@@ -4,18 +4,17 @@ use super::{
     Matrix, PetscError, Session, Vector, check,
     error::{NOT_DEFINITE, return_code},
     handle::Handle,
-    kept,
-    kept::{Context, KeptPreconditioner},
     options::c_string,
     raw,
     session::world,
+    shell_preconditioner::{self, Context, ShellPreconditioner},
 };
 use std::{
     ffi::{CStr, c_int, c_void},
     ptr,
 };
 
-/// A KSP: conjugate gradients with the preconditioner [`kept::NAME`], unless PETSc options with its prefix
+/// A KSP: conjugate gradients with the preconditioner [`shell_preconditioner::NAME`], unless PETSc options with its prefix
 /// choose other types.
 ///
 /// The convergence test computes the norm of the residual on the free unknowns. So `-ksp_norm_type` changes
@@ -49,7 +48,7 @@ pub(crate) struct KspReport {
     pub(crate) iterations: usize,
     /// ‖b − A x‖₂ of the free unknowns.
     pub(crate) norm: f64,
-    /// PETSc's reason for the end, as `DIVERGED_ITS`; `None` with the preconditioner [`kept::NAME`].
+    /// PETSc's reason for the end, as `DIVERGED_ITS`; `None` with the preconditioner [`shell_preconditioner::NAME`].
     pub(crate) reason: Option<&'static str>,
 }
 
@@ -78,7 +77,7 @@ impl Ksp {
         unsafe {
             check(raw::KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
             check(raw::KSPSetType(ksp, c"cg".as_ptr()))?;
-            check(raw::PCSetType(this.pc()?, kept::NAME.as_ptr()))?;
+            check(raw::PCSetType(this.pc()?, shell_preconditioner::NAME.as_ptr()))?;
         }
         Ok(this)
     }
@@ -111,13 +110,15 @@ impl Ksp {
         }
     }
 
-    /// Whether the preconditioner is of the type [`kept::NAME`].
-    pub(crate) fn is_kept(&self) -> Result<bool, PetscError> {
-        let mut kept = raw::PetscBool::PETSC_FALSE;
+    /// Whether the preconditioner is of the type [`shell_preconditioner::NAME`].
+    pub(crate) fn uses_own_factor(&self) -> Result<bool, PetscError> {
+        let mut same = raw::PetscBool::PETSC_FALSE;
         let object = self.pc()?.cast::<raw::_p_PetscObject>();
         // SAFETY: a live handle, whose type is compared with a string.
-        check(unsafe { raw::PetscObjectTypeCompare(object, kept::NAME.as_ptr(), &mut kept) })?;
-        Ok(kept == raw::PetscBool::PETSC_TRUE)
+        check(unsafe {
+            raw::PetscObjectTypeCompare(object, shell_preconditioner::NAME.as_ptr(), &mut same)
+        })?;
+        Ok(same == raw::PetscBool::PETSC_TRUE)
     }
 
     fn pc(&self) -> Result<raw::PC, PetscError> {
@@ -132,10 +133,10 @@ impl Ksp {
     pub(crate) fn set_up(
         &self,
         matrix: &Matrix,
-        kept: &mut dyn KeptPreconditioner,
+        own: &mut dyn ShellPreconditioner,
     ) -> Result<bool, PetscError> {
         let (ksp, pc) = (self.handle.raw(), self.pc()?);
-        let mut context = Context { preconditioner: kept };
+        let mut context = Context { preconditioner: own };
         let stored = matrix.assembled()?;
         // SAFETY: live handles; the context outlives the set-up. Without PCSetReusePreconditioner the
         // next solve would factorise again when the values of the matrix have changed.
@@ -180,16 +181,16 @@ impl Ksp {
     pub(crate) fn solve(
         &mut self,
         problem: &KspProblem,
-        kept: &mut dyn KeptPreconditioner,
+        own: &mut dyn ShellPreconditioner,
         b: &Vector,
         x: &mut Vector,
     ) -> Result<KspReport, PetscError> {
         let (ksp, pc) = (self.handle.raw(), self.pc()?);
         // Some of PETSc's preconditioners read the entries in every application.
         let matrix = problem.matrix;
-        let is_kept = self.is_kept()?;
-        let stored = if is_kept { matrix.stored() } else { matrix.assembled()? };
-        let mut context = Context { preconditioner: kept };
+        let uses_own_factor = self.uses_own_factor()?;
+        let stored = if uses_own_factor { matrix.stored() } else { matrix.assembled()? };
+        let mut context = Context { preconditioner: own };
         let Self { residual, work, .. } = self;
         let mut test = Test { problem, residual, work, norm: None };
         let pointer = ptr::from_mut(&mut test).cast::<c_void>();
@@ -208,7 +209,7 @@ impl Ksp {
         }
         // SAFETY: a name in PETSc's constant table.
         let reason = unsafe { CStr::from_ptr(reason) }.to_str().ok();
-        let reason = reason.filter(|_| !is_kept);
+        let reason = reason.filter(|_| !uses_own_factor);
         let tested = test.norm;
         let norm = match tested {
             Some(norm) => norm,

@@ -18,7 +18,7 @@ mod error;
 mod ghosts;
 mod graph;
 mod handle;
-mod kept;
+mod shell_preconditioner;
 mod ksp;
 mod matrix;
 mod options;
@@ -39,10 +39,10 @@ pub use vector::Vector;
 
 pub(crate) use ghosts::Ghosts;
 pub(crate) use graph::divide;
-pub(crate) use kept::KeptPreconditioner;
 pub(crate) use ksp::{Ksp, KspProblem};
 pub(crate) use matrix::Operator;
 pub(crate) use options::{has_option, set_default_option};
+pub(crate) use shell_preconditioner::ShellPreconditioner;
 pub(crate) use tao::{BoundedQuadratic, TaoReport};
 
 use error::check;

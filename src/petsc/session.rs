@@ -1,8 +1,8 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, kept, options,
-    options::c_string, raw,
+    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
+    options::c_string, raw, shell_preconditioner,
 };
 use crate::memory::address_space;
 use std::{
@@ -119,7 +119,7 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     started?;
     // SAFETY: PETSc runs; the handler needs no context.
     check(unsafe { raw::PetscPushErrorHandler(Some(keep_message), ptr::null_mut()) })?;
-    kept::register()
+    shell_preconditioner::register()
 }
 
 /// `PETSC_COMM_WORLD`.

@@ -4,11 +4,10 @@ use super::{
     Matrix, PetscError, Session, Vector, check,
     error::return_code,
     handle::Handle,
-    kept,
-    kept::{Context, KeptPreconditioner},
     options::{c_string, has_option, set_default_option},
     raw,
     session::world,
+    shell_preconditioner::{self, Context, ShellPreconditioner},
     vector::same_size,
 };
 use std::{ffi::c_void, ptr};
@@ -38,7 +37,7 @@ struct Problem<'a> {
 }
 
 impl BoundedQuadratic {
-    /// TAO's `method` (`tron`, `bnls`, …), with the preconditioner `kept` unless PETSc options choose
+    /// TAO's `method` (`tron`, `bnls`, …), with the PC type `kept` unless PETSc options choose
     /// another.
     ///
     /// Steihaug's conjugate gradients (KSPSTCG) solve the Newton systems. They take the whole step unless
@@ -66,7 +65,7 @@ impl BoundedQuadratic {
             check(raw::TaoGetKSP(tao, &mut ksp))?;
             if !quasi_newton && !ksp.is_null() {
                 check(raw::KSPGetPC(ksp, &mut pc))?;
-                check(raw::PCSetType(pc, kept::NAME.as_ptr()))?;
+                check(raw::PCSetType(pc, shell_preconditioner::NAME.as_ptr()))?;
             }
             check(raw::TaoSetFromOptions(tao))?;
             Ok(this)
@@ -82,14 +81,14 @@ impl BoundedQuadratic {
         [lower, upper]: [&Vector; 2],
         x: &mut Vector,
         (limit, most): (f64, usize),
-        preconditioner: &mut dyn KeptPreconditioner,
+        preconditioner: &mut dyn ShellPreconditioner,
     ) -> Result<TaoReport, PetscError> {
         for size in [k.owned(), f.owned(), lower.owned(), upper.owned()] {
             same_size(x.owned(), size)?;
         }
         // Null: TAO makes the vector for the gradient itself.
         let (tao, own) = (self.tao.raw(), ptr::null_mut());
-        let mut kept = Context { preconditioner };
+        let mut context_of_pc = Context { preconditioner };
         let problem = Problem { k, f };
         let context = ptr::from_ref(&problem).cast_mut().cast::<c_void>();
         let (mut iterations, mut linear, mut reason) = (0, 0, 0);
@@ -111,7 +110,7 @@ impl BoundedQuadratic {
                 check(raw::KSPSetTolerances(ksp, 1e-12, 0.5 * limit, f64::MAX, 200))?;
                 check(raw::KSPGetPC(ksp, &mut pc))?;
                 // A preconditioner of another type, chosen by options, ignores this.
-                kept.set(pc)?;
+                context_of_pc.set(pc)?;
             }
             check(raw::TaoSolve(tao))?;
             check(raw::TaoGetIterationNumber(tao, &mut iterations))?;

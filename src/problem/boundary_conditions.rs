@@ -2,9 +2,9 @@
 
 use crate::{
     ROUNDING,
-    contact::{RigidMotions, Row},
+    contact::{NodalConstraint, RigidMotions},
     fem::{Body, Edge, normal_error},
-    mesh::{BoundaryNode, Face, Lines, boundary_nodes, extent, joined_faces},
+    mesh::{BoundaryFace, BoundaryNode, Lines, boundary_nodes, extent, joined_faces},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
@@ -12,7 +12,7 @@ use crate::{
 #[derive(Debug, Default)]
 pub(super) struct BoundaryConditions {
     /// The prescribed displacements, then the gaps, joined where boundaries meet smoothly.
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<NodalConstraint>,
     /// Per row: its value.
     pub(super) values: Vec<RowValue>,
     /// The names of the boundaries that support the body, and per row of a prescribed displacement the number of its
@@ -89,15 +89,15 @@ impl BoundaryConditions {
             );
         }
         for (node, faces) in joined_faces(gaps) {
-            for (Face { normal: direction, length, .. }, distances) in faces {
-                let row = Row { node, direction, tributary_length: Some(length) };
+            for (BoundaryFace { normal: direction, length, .. }, distances) in faces {
+                let row = NodalConstraint { node, direction, tributary_length: Some(length) };
                 conditions.add(row, points, distances);
             }
         }
         conditions
     }
 
-    fn add(&mut self, row: Row, points: &[[f64; 2]], of: Vec<Expression>) {
+    fn add(&mut self, row: NodalConstraint, points: &[[f64; 2]], of: Vec<Expression>) {
         self.rows.push(row);
         self.values.push(RowValue { point: points[row.node], of });
     }
@@ -115,7 +115,7 @@ impl BoundaryConditions {
     }
 
     fn add_fixed_rows(&mut self, boundary: &Boundary, points: &[[f64; 2]], at: &BoundaryNode) {
-        let row = |direction| Row { node: at.node, direction, tributary_length: None };
+        let row = |direction| NodalConstraint { node: at.node, direction, tributary_length: None };
         for condition in &boundary.conditions {
             if let Condition::Displacement(components) = condition {
                 for (component, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
@@ -135,10 +135,10 @@ impl BoundaryConditions {
 }
 
 /// The faces of a gap at a node: in the fixed direction of the gap, or along the boundary's normals.
-fn faces(gap: &Gap, at: &BoundaryNode) -> Vec<Face> {
+fn faces(gap: &Gap, at: &BoundaryNode) -> Vec<BoundaryFace> {
     match gap.normal {
         Some(normal) => {
-            vec![Face::plane(normal, at.faces.iter().map(|face| face.length).sum())]
+            vec![BoundaryFace::plane(normal, at.faces.iter().map(|face| face.length).sum())]
         }
         None => at.faces.clone(),
     }

@@ -78,7 +78,7 @@ impl DiscreteProblem {
     }
 
     fn check_time(&self, time: f64) -> Result<(), SetupError> {
-        self.posed(time, &self.loads.values_at(time))?;
+        self.prescribed_and_bounds(time, &self.loads.values_at(time))?;
         if self.motions.all_prevented() {
             return Ok(());
         }

@@ -12,16 +12,16 @@
 //!
 //! Where boundaries meet smoothly at a node, those with the least gap there share its reaction.
 //!
-//! At a vertex between two materials the pressure jumps. Each side then has a station of its own. With the parts λ_a and λ_b of
+//! At a vertex between two materials the pressure jumps. Each side then has a line node of its own. With the parts λ_a and λ_b of
 //! the length there, the reaction F = (λ_a + λ_b) p becomes the pressures p_a = p − J λ_b/(λ_a + λ_b) and p_b = p_a + J. The
-//! jump J is the difference of the pressures that the next two stations of each side extrapolate.
+//! jump J is the difference of the pressures that the next two line nodes of each side extrapolate.
 
 use super::State;
 use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge},
-    mesh::{Face, Lines, joined_faces},
+    mesh::{BoundaryFace, Lines, joined_faces},
     scene::{Expression, Gap},
 };
 use serde::Serialize;
@@ -31,33 +31,33 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Clone, Default)]
 pub struct ContactLine {
     /// Part by part with the body on the left.
-    pub(super) stations: Vec<Station>,
-    /// Per node: its faces, each with the stations and their lengths of it, m.
-    places: BTreeMap<usize, Vec<(Face, Vec<Place>)>>,
-    /// The stations at which closed parts begin and end in a vertex without a corner.
+    pub(super) line_nodes: Vec<LineNode>,
+    /// Per node: its faces, each with the line nodes and their lengths of it, m.
+    places: BTreeMap<usize, Vec<(BoundaryFace, Vec<Place>)>>,
+    /// The line nodes at which closed parts begin and end in a vertex without a corner.
     seams: Vec<[usize; 2]>,
-    /// The two stations of each vertex between materials: the end of an edge, and the start of the next one.
+    /// The two line nodes of each vertex between materials: the end of an edge, and the start of the next one.
     joints: Vec<[usize; 2]>,
     /// Per number of a boundary: its gap g(x, y, t), m.
     gaps: BTreeMap<usize, Expression>,
 }
 
-/// A station and its part of the length of a face, m.
+/// A line node, and its part of the length of a face, m.
 type Place = (usize, f64);
 
-/// The share of a station in a contact point: its factors of the force F and of the pressure F/∫φ, and its gap beyond
+/// The share of a line node in the reaction of a contact point: its factors of the force F and of the pressure F/∫φ, and its gap beyond
 /// the least one there, m.
-pub(super) struct Share {
-    pub(super) station: usize,
+pub(super) struct ReactionShare {
+    pub(super) line_node: usize,
     pub(super) force: f64,
     pressure: f64,
     farther: f64,
 }
 
-/// A vertex or the middle of an edge, on one part of a boundary. A corner is two stations, and so is the vertex at
+/// A node of the line: a vertex or the middle of an edge, on one part of a boundary. A corner is two line nodes, and so is the vertex at
 /// which a closed part begins and ends.
 #[derive(Debug, Clone)]
-pub(super) struct Station {
+pub(super) struct LineNode {
     pub(super) boundary: usize,
     /// Half of the length of the edges of a vertex, m; 0 in the middle of an edge.
     length: f64,
@@ -95,7 +95,7 @@ pub struct ContactRow {
     pub force: f64,
 }
 
-/// The reaction at a station, as the ranks exchange it: station, ν_x, ν_y, gap, reaction (N per metre of thickness),
+/// The reaction at a line node, as the ranks exchange it: line node, ν_x, ν_y, gap, reaction (N per metre of thickness),
 /// reaction over ∫φ (Pa), active.
 type Reaction = [f64; 7];
 
@@ -119,7 +119,7 @@ impl ContactLine {
         }
         line.places = joined_faces(places);
         let joints = between.iter().flat_map(|node| line.places.get(node)).flatten();
-        let pair = |(_, places): &(Face, Vec<Place>)| match places[..] {
+        let pair = |(_, places): &(BoundaryFace, Vec<Place>)| match places[..] {
             [(a, _), (b, _)] if line.beside(a, -1, 1).is_some() => Some([a, b]),
             [(a, _), (b, _)] => Some([b, a]),
             _ => None,
@@ -135,17 +135,19 @@ impl ContactLine {
         normal: Option<[f64; 2]>,
         (points, lines, between): (&[[f64; 2]], &Lines, &BTreeSet<usize>),
         edges: &[Edge],
-        places: &mut Vec<(usize, Face, Place)>,
+        places: &mut Vec<(usize, BoundaryFace, Place)>,
     ) {
         let distance =
             |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
-        let face = |face: Face| normal.map_or(face, |normal| Face::plane(normal, face.length));
-        let station = |node: usize, arc_length: f64, length: f64| {
-            let [x, y] = points[node];
-            Station { boundary, length, row: ContactRow { arc_length, x, y, ..row.clone() } }
+        let face = |face: BoundaryFace| {
+            normal.map_or(face, |normal| BoundaryFace::plane(normal, face.length))
         };
-        let begin = self.stations.len();
-        let (mut start, mut first, mut last) = (0.0, None::<Face>, None::<Face>);
+        let line_node = |node: usize, arc_length: f64, length: f64| {
+            let [x, y] = points[node];
+            LineNode { boundary, length, row: ContactRow { arc_length, x, y, ..row.clone() } }
+        };
+        let begin = self.line_nodes.len();
+        let (mut start, mut first, mut last) = (0.0, None::<BoundaryFace>, None::<BoundaryFace>);
         for edge in edges {
             let faces: Vec<_> = edge.faces(points, lines).map(|(n, f)| (n, face(f))).collect();
             let [a, b] = edge.ends;
@@ -153,16 +155,16 @@ impl ContactLine {
             let half = distance(a, middle);
             let length = half + distance(middle, b);
             let goes_on = !between.contains(&a);
-            match self.stations.last_mut() {
+            match self.line_nodes.last_mut() {
                 Some(before) if goes_on && last.is_some_and(|l| l.continues(&faces[0].1)) => {
                     before.length += 0.5 * length;
                 }
-                _ => self.stations.push(station(a, start, 0.5 * length)),
+                _ => self.line_nodes.push(line_node(a, start, 0.5 * length)),
             }
-            let number = self.stations.len() - 1;
-            self.stations.extend(edge.middle.map(|m| station(m, start + half, 0.0)));
-            self.stations.push(station(b, start + length, 0.5 * length));
-            let numbers = [number, self.stations.len() - 1, number + 1];
+            let number = self.line_nodes.len() - 1;
+            self.line_nodes.extend(edge.middle.map(|m| line_node(m, start + half, 0.0)));
+            self.line_nodes.push(line_node(b, start + length, 0.5 * length));
+            let numbers = [number, self.line_nodes.len() - 1, number + 1];
             let of_edge = faces.iter().zip(numbers);
             places.extend(of_edge.map(|(&(node, face), n)| (node, face, (n, face.length))));
             (start, first, last) = (start + length, first.or(Some(faces[0].1)), Some(faces[1].1));
@@ -172,7 +174,7 @@ impl ContactLine {
             && !between.contains(&from)
             && first.zip(last).is_some_and(|(first, last)| last.continues(&first))
         {
-            self.seams.push([begin, self.stations.len() - 1]);
+            self.seams.push([begin, self.line_nodes.len() - 1]);
         }
     }
 
@@ -184,52 +186,53 @@ impl ContactLine {
 
     /// The shares of a contact point at time t: in the face with its normal. Those of the boundaries with the least gap there
     /// bear the force, by their lengths.
-    pub(super) fn shares(&self, point: &ContactPoint, t: f64) -> Vec<Share> {
+    pub(super) fn shares(&self, point: &ContactPoint, t: f64) -> Vec<ReactionShare> {
         let Some(faces) = self.places.get(&point.node) else { return Vec::new() };
-        let own = Face::plane(point.normal, 0.0);
-        let off = |(face, _): &(Face, Vec<Place>)| face.angle(&own);
+        let own = BoundaryFace::plane(point.normal, 0.0);
+        let off = |(face, _): &(BoundaryFace, Vec<Place>)| face.angle(&own);
         let nearest = faces.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
         let mut lengths = BTreeMap::new();
-        for &(station, length) in nearest.iter().flat_map(|(_, places)| places) {
-            *lengths.entry(station).or_insert(0.0) += length;
+        for &(line_node, length) in nearest.iter().flat_map(|(_, places)| places) {
+            *lengths.entry(line_node).or_insert(0.0) += length;
         }
-        let gap = |station: usize| {
-            let Station { boundary, row: ContactRow { x, y, .. }, .. } = &self.stations[station];
+        let gap = |line_node: usize| {
+            let LineNode { boundary, row: ContactRow { x, y, .. }, .. } =
+                &self.line_nodes[line_node];
             self.gaps.get(boundary).map_or(0.0, |gap| gap.eval(*x, *y, t))
         };
-        let least = lengths.keys().map(|station| gap(*station)).fold(f64::INFINITY, f64::min);
+        let least = lengths.keys().map(|line_node| gap(*line_node)).fold(f64::INFINITY, f64::min);
         let total: f64 = lengths.values().sum();
-        let bears = |station: usize| gap(station) - least <= ROUNDING * total;
-        let bearing = lengths.iter().filter(|(station, _)| bears(**station));
+        let bears = |line_node: usize| gap(line_node) - least <= ROUNDING * total;
+        let bearing = lengths.iter().filter(|(line_node, _)| bears(**line_node));
         let bearing: f64 = bearing.map(|(_, length)| length).sum();
-        let share = |(&station, length): (&usize, &f64)| {
-            let part = if bears(station) { 1.0 / bearing } else { 0.0 };
+        let share = |(&line_node, length): (&usize, &f64)| {
+            let part = if bears(line_node) { 1.0 / bearing } else { 0.0 };
             let [force, pressure] = [length * part, total * part];
-            Share { station, force, pressure, farther: gap(station) - least }
+            ReactionShare { line_node, force, pressure, farther: gap(line_node) - least }
         };
         lengths.iter().map(share).collect()
     }
 
-    /// The arc length between a station and the one that follows `steps` later or earlier on its part, m, and its number.
-    fn beside(&self, station: usize, direction: isize, steps: isize) -> Option<(f64, usize)> {
-        let number = station.checked_add_signed(direction * steps)?;
-        let [own, other] = [&self.stations[station].row, &self.stations.get(number)?.row];
+    /// The arc length between a line node and the one that follows `steps` later or earlier on its part, m, and its number.
+    fn beside(&self, line_node: usize, direction: isize, steps: isize) -> Option<(f64, usize)> {
+        let number = line_node.checked_add_signed(direction * steps)?;
+        let [own, other] = [&self.line_nodes[line_node].row, &self.line_nodes.get(number)?.row];
         let length = direction as f64 * (other.arc_length - own.arc_length);
         let is_beside = (&own.boundary, own.part) == (&other.boundary, other.part) && length > 0.0;
         is_beside.then_some((length, number))
     }
 
-    /// The reactions at all stations in order, on every rank, with those of joints in proportion to lengths. Collective.
+    /// The reactions at all line nodes in order, on every rank, with those of joints in proportion to lengths. Collective.
     fn reactions(&self, body: &Body, contact: &[ContactPoint], t: f64) -> Vec<Reaction> {
         let reactions = |point: &ContactPoint| {
             let ContactPoint { normal, force, pressure, gap, active, .. } = *point;
             // No -0.
             let [nx, ny] = normal.map(|n| n + 0.0);
             let force = if active { force } else { 0.0 };
-            let of = move |share: Share| {
-                let (station, gap) = (share.station as f64, gap + share.farther);
+            let of = move |share: ReactionShare| {
+                let (line_node, gap) = (share.line_node as f64, gap + share.farther);
                 let active = f64::from(u8::from(active && share.force > 0.0));
-                [station, nx, ny, gap, share.force * force, share.pressure * pressure, active]
+                [line_node, nx, ny, gap, share.force * force, share.pressure * pressure, active]
             };
             self.shares(point, t).into_iter().map(of)
         };
@@ -240,15 +243,15 @@ impl ContactLine {
         all
     }
 
-    /// The force to move from the first to the second station of each joint, N per metre of thickness, and the places of both
+    /// The force to move from the first to the second line node of each joint, N per metre of thickness, and the places of both
     /// in `all` reactions.
     fn moved<'a>(&'a self, all: &'a [Reaction]) -> impl Iterator<Item = ([usize; 2], f64)> + 'a {
         let place = |k: usize| all.binary_search_by(|of| of[0].total_cmp(&(k as f64))).ok();
         // Another joint does not know its pressures yet.
-        let is_joint = |station: &usize| self.joints.as_flattened().contains(station);
-        let extrapolated = move |station: usize, direction: isize| {
+        let is_joint = |line_node: &usize| self.joints.as_flattened().contains(line_node);
+        let extrapolated = move |line_node: usize, direction: isize| {
             let beside = |steps: isize| {
-                let (length, number) = self.beside(station, direction, steps)?;
+                let (length, number) = self.beside(line_node, direction, steps)?;
                 Some((length, all[place(number)?][5])).filter(|_| !is_joint(&number))
             };
             let (length, p) = beside(1)?;
@@ -271,16 +274,16 @@ impl ContactLine {
         body: &Body,
         (contact, t): (&[ContactPoint], f64),
     ) -> Vec<([usize; 2], [f64; 2], [f64; 2])> {
-        let boundaries = |of: &[usize; 2]| of.map(|station| self.stations[station].boundary);
+        let boundaries = |of: &[usize; 2]| of.map(|line_node| self.line_nodes[line_node].boundary);
         if !self.joints.iter().map(boundaries).any(|[a, b]| a != b) {
             return Vec::new();
         }
         let all = self.reactions(body, contact, t);
         let of = |(places, force): ([usize; 2], f64)| {
             let [nx, ny] = [1, 2].map(|k| -force * all[places[0]][k]);
-            let stations = places.map(|i| &self.stations[all[i][0] as usize]);
-            let ContactRow { x, y, .. } = stations[0].row;
-            (stations.map(|of| of.boundary), [x, y], [nx, ny])
+            let line_nodes = places.map(|i| &self.line_nodes[all[i][0] as usize]);
+            let ContactRow { x, y, .. } = line_nodes[0].row;
+            (line_nodes.map(|of| of.boundary), [x, y], [nx, ny])
         };
         let is_first = body.nodes.partition.comm().rank() == 0;
         self.moved(&all).map(of).filter(|_| is_first).collect()
@@ -298,28 +301,28 @@ impl ContactLine {
         }
         let pressures = self.pressures(&all);
         let row = |&[number, normal_x, normal_y, gap, force, _, active]: &Reaction| {
-            let (station, time) = (number as usize, state.time);
-            let (pressure, active) = (pressures[station], active as u8);
-            let row = self.stations[station].row.clone();
+            let (line_node, time) = (number as usize, state.time);
+            let (pressure, active) = (pressures[line_node], active as u8);
+            let row = self.line_nodes[line_node].row.clone();
             ContactRow { time, normal_x, normal_y, gap, pressure, active, force, ..row }
         };
-        let nodal = |(node, faces): (&usize, &Vec<(Face, Vec<Place>)>)| {
+        let nodal = |(node, faces): (&usize, &Vec<(BoundaryFace, Vec<Place>)>)| {
             let places = faces.iter().flat_map(|(_, places)| places);
-            (*node, places.map(|(station, _)| pressures[*station]).fold(0.0, f64::max))
+            (*node, places.map(|(line_node, _)| pressures[*line_node]).fold(0.0, f64::max))
         };
         (all.iter().map(row).collect(), self.places.iter().map(nodal).collect())
     }
 
-    /// The pressure at each station, Pa.
+    /// The pressure at each line node, Pa.
     fn pressures(&self, reactions: &[Reaction]) -> Vec<f64> {
-        let stations = &self.stations;
-        let (mut forces, mut nodal) = (vec![0.0; stations.len()], vec![None; stations.len()]);
+        let line_nodes = &self.line_nodes;
+        let (mut forces, mut nodal) = (vec![0.0; line_nodes.len()], vec![None; line_nodes.len()]);
         for &[number, .., force, pressure, _] in reactions {
             forces[number as usize] += force;
             nodal[number as usize] = Some(pressure);
         }
-        let middles = || (0..stations.len()).filter(|&i| stations[i].length == 0.0);
-        let arc = |i: usize| stations[i].row.arc_length;
+        let middles = || (0..line_nodes.len()).filter(|&i| line_nodes[i].length == 0.0);
+        let arc = |i: usize| line_nodes[i].row.arc_length;
         for i in middles() {
             let (a, b, length) = (i - 1, i + 1, arc(i + 1) - arc(i - 1));
             let [p, q] =
@@ -329,12 +332,12 @@ impl ContactLine {
             forces[a] += share;
             forces[b] += forces[i] - share;
         }
-        let vertices = stations.iter().zip(&mut forces).filter(|(of, _)| of.length > 0.0);
+        let vertices = line_nodes.iter().zip(&mut forces).filter(|(of, _)| of.length > 0.0);
         vertices.for_each(|(of, force)| *force /= of.length);
         for seam in &self.seams {
-            let [p, q] = seam.map(|station| (stations[station].length, forces[station]));
+            let [p, q] = seam.map(|line_node| (line_nodes[line_node].length, forces[line_node]));
             let mean = (p.0 * p.1 + q.0 * q.1) / (p.0 + q.0);
-            seam.iter().for_each(|station| forces[*station] = mean);
+            seam.iter().for_each(|line_node| forces[*line_node] = mean);
         }
         for i in middles() {
             let (a, b) = (i - 1, i + 1);
@@ -353,7 +356,7 @@ impl ContactLine {
         let (mut length, mut ends) = (0.0, Vec::new());
         for part in parts_from_open_nodes(rows) {
             let [first, .., last] = &part[..] else { continue };
-            let rows = self.stations.iter().map(|station| &station.row);
+            let rows = self.line_nodes.iter().map(|line_node| &line_node.row);
             let is_here =
                 |of: &&ContactRow| (&of.boundary, of.part) == (&first.boundary, first.part);
             let whole = rows.rev().find(is_here).map(|end| end.arc_length);

@@ -12,9 +12,9 @@ pub(crate) struct LoadCase {
     /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
     pub(crate) load: Vec<f64>,
     pub(crate) work: DVector<f64>,
-    /// The values of all rows, m, and the unknowns prescribed by them, 0 elsewhere.
+    /// The values of all constraints, m, and the unknowns c that they prescribe, 0 elsewhere.
     pub(crate) values: Vec<f64>,
-    pub(crate) lift: Vec<f64>,
+    pub(crate) c_prescribed: Vec<f64>,
     /// The bounds on the other unknowns.
     pub(crate) bounds: Vec<Bound>,
 }
@@ -38,8 +38,8 @@ impl DiscreteProblem {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
         let values = self.loads.values_at(time);
-        let (lift, bounds) = self.posed(time, &values)?;
-        Ok(LoadCase { time, load, work, values, lift, bounds })
+        let (c_prescribed, bounds) = self.prescribed_and_bounds(time, &values)?;
+        Ok(LoadCase { time, load, work, values, c_prescribed, bounds })
     }
 
     /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
@@ -63,7 +63,7 @@ impl DiscreteProblem {
     }
 
     /// The prescribed unknowns and the bounds on the others at `time`, from the values of all rows.
-    pub(super) fn posed(
+    pub(super) fn prescribed_and_bounds(
         &self,
         time: f64,
         values: &[f64],
@@ -73,6 +73,6 @@ impl DiscreteProblem {
         }
         let (scene, time) = (self.scene.path.clone(), self.scene.time.map(|_| time));
         let constraint = |source| SetupError::Constraint { scene, time, source };
-        self.constraints.pose(values, &self.body.nodes.points).map_err(constraint)
+        self.constraints.prescribed_and_bounds(values, &self.body.nodes.points).map_err(constraint)
     }
 }

@@ -14,7 +14,7 @@ use super::{
     notes::NOTED,
 };
 use crate::{
-    contact::Row,
+    contact::NodalConstraint,
     fem::{Body, Subdomain},
     scene::{Expression, Scene},
 };
@@ -39,7 +39,7 @@ impl Loads {
     /// Takes the loads on `body` and the values of its rows from the `conditions`.
     pub(super) fn new(body: &Body, scene: &Scene, conditions: &mut BoundaryConditions) -> Self {
         let (tractions, values) = (take(&mut conditions.tractions), take(&mut conditions.values));
-        let first = |(row, value): (&Row, &RowValue)| match row.is_gap() {
+        let first = |(row, value): (&NodalConstraint, &RowValue)| match row.is_gap() {
             true => value.at(scene.start()),
             false => 0.0,
         };

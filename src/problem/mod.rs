@@ -77,7 +77,7 @@ pub struct DiscreteProblem {
     laws: Vec<DamageLaw>,
     /// Displacement conditions as unknowns and bounds, for the solvers.
     pub constraints: Constraints,
-    /// The same conditions as posed, to certify answers.
+    /// The same conditions in global coordinates, to certify answers.
     pub certificate: Certificate,
     /// Rigid motions that Γ_D leaves unconstrained.
     pub motions: RigidMotions,

@@ -4,7 +4,7 @@ use super::{ContactLine, boundary_conditions::BoundaryConditions};
 use crate::{
     contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
-    mesh::{Face, Lines, sorted},
+    mesh::{BoundaryFace, Lines, sorted},
     scene::{Boundary, Scene},
 };
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -32,7 +32,7 @@ struct NodeEdge {
     triangle: usize,
     at: [f64; 3],
     /// ν and ∫φ_i.
-    face: Face,
+    face: BoundaryFace,
 }
 
 impl Supports {
@@ -124,7 +124,7 @@ impl Supports {
         for point in contact {
             let force = point.normal.map(|n| -point.force * n);
             for share in self.contact.shares(point, t) {
-                let boundary = self.contact.stations[share.station].boundary;
+                let boundary = self.contact.line_nodes[share.line_node].boundary;
                 add(boundary, points[point.node], force.map(|f| share.force * f));
             }
             if let Some([x, y]) = rest.get_mut(&point.node) {

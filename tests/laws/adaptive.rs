@@ -33,11 +33,11 @@ fn the_error_is_at_most_the_one_asked_for_and_not_much_less() {
     let exact = work(adapted(3e-3).mesh);
     let mut triangles = Vec::new();
     for accuracy in [0.1, 0.03, 0.01] {
-        let Adapted { mesh, error, short, .. } = adapted(accuracy);
+        let Adapted { mesh, error, not_reached, .. } = adapted(accuracy);
         triangles.push(mesh.triangles.len() as f64);
         let truth = (1.0 - work(mesh) / exact).sqrt();
         println!("{accuracy}: estimated {error:.5}, true {truth:.5}, {triangles:?}");
-        assert!(short.is_none() && error <= accuracy, "{short:?}");
+        assert!(not_reached.is_none() && error <= accuracy, "{not_reached:?}");
         assert!(truth < accuracy && truth > 0.3 * accuracy, "{truth} for {accuracy}");
         assert!(0.7 * truth < error && error < 1.4 * truth, "{error} for {truth}");
     }
@@ -68,10 +68,13 @@ fn a_slender_body_reaches_every_accuracy_in_few_rounds() {
                 {{ name = 'right', traction = [0, -0.1] }},
              ]"
         ));
-        let Adapted { mesh, rounds, error, short, .. } =
+        let Adapted { mesh, rounds, error, not_reached, .. } =
             adapted(&strip, Mesh::rectangle(50.0, 1.0, 4, 1), accuracy);
         println!("{accuracy}: {error:.5}, {} triangles, mesh {rounds}", mesh.triangles.len());
-        assert!(short.is_none() && error <= accuracy && rounds <= 15, "{short:?}, mesh {rounds}");
+        assert!(
+            not_reached.is_none() && error <= accuracy && rounds <= 15,
+            "{not_reached:?}, mesh {rounds}"
+        );
     }
 }
 
@@ -96,7 +99,7 @@ fn a_peak_of_the_foundation_that_the_first_triangles_miss_is_no_reason_to_give_u
                  ]"
             ));
             let found = adapted(&scene, Mesh::rectangle(2.0, 1.0, 2, 1), accuracy);
-            assert!(found.short.is_none(), "{gap}, {accuracy}: {:?}", found.short);
+            assert!(found.not_reached.is_none(), "{gap}, {accuracy}: {:?}", found.not_reached);
             let force = solved(scene, found.mesh).last.record.contact_force;
             let bar = found.measured.bars.iter().find(|bar| bar.name == "contact_force").unwrap();
             let exact = *exact.get_or_insert(force);
@@ -123,10 +126,13 @@ fn adaptive_steps_are_no_error_of_the_mesh() {
              ]",
             2 * cycles
         ));
-        let Adapted { rounds, short, measured, .. } = adapted(&scene, square(2), accuracy);
+        let Adapted { rounds, not_reached, measured, .. } = adapted(&scene, square(2), accuracy);
         let worst = measured.bars.iter().map(|bar| bar.relative()).fold(0.0, f64::max);
         println!("{cycles} cycles, {accuracy}: {rounds} rounds, {worst:.1e}");
-        assert!(short.is_none() && rounds == 1, "{cycles} cycles: {rounds} rounds, {short:?}");
+        assert!(
+            not_reached.is_none() && rounds == 1,
+            "{cycles} cycles: {rounds} rounds, {not_reached:?}"
+        );
         assert!(worst < 1e-6, "{cycles} cycles, {accuracy}: {worst}");
     }
 }

@@ -68,9 +68,9 @@ fn an_accuracy_is_that_of_every_figure() {
     let reference = figures(&solved(block(2, "", "0", "-5"), reference));
     for accuracy in [0.03, 0.01] {
         let scene = block(2, "", "0", "-5");
-        let Adapted { mesh, short, worst, .. } = adapted(&scene, square(2), accuracy);
+        let Adapted { mesh, not_reached, worst, .. } = adapted(&scene, square(2), accuracy);
         let (name, error) = worst.expect("it is measured");
-        assert!(short.is_none() && error <= accuracy, "{short:?}, {name}: {error}");
+        assert!(not_reached.is_none() && error <= accuracy, "{not_reached:?}, {name}: {error}");
         for (found, exact) in figures(&solved(scene, mesh)).iter().zip(reference) {
             assert!((found - exact).abs() < accuracy * exact, "{found} is not {exact}");
         }

@@ -2,9 +2,9 @@
 
 use crate::support::{problem, run, square};
 use signorini::{
-    contact::{Conflict, ConstraintError, Constraints, Row, SOLVERS},
+    contact::{Conflict, ConstraintError, Constraints, NodalConstraint, SOLVERS},
     evolution::SetupError,
-    mesh::{Face, Mesh, joined_faces},
+    mesh::{BoundaryFace, Mesh, joined_faces},
 };
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
@@ -127,12 +127,12 @@ fn contradictory_values_at_a_common_node_are_an_error() {
 }
 
 /// Conditions at node 0.
-fn prescribed(direction: [f64; 2]) -> Row {
-    Row { node: 0, direction, tributary_length: None }
+fn prescribed(direction: [f64; 2]) -> NodalConstraint {
+    NodalConstraint { node: 0, direction, tributary_length: None }
 }
 
-fn gap(direction: [f64; 2]) -> Row {
-    Row { node: 0, direction, tributary_length: Some(1.0) }
+fn gap(direction: [f64; 2]) -> NodalConstraint {
+    NodalConstraint { node: 0, direction, tributary_length: Some(1.0) }
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn a_node_between_two_plates_has_one_unknown_with_two_bounds() {
         let n = [angle.sin(), -angle.cos()];
         let (origin, mut rows) = ([[0.0, 0.0]], [gap(n), gap(n.map(|v| -v))]);
         let constraints = Constraints::new(&origin, &mut rows, &[upper, lower]).unwrap();
-        let (_, bounds) = constraints.pose(&[upper, lower], &origin).unwrap();
+        let (_, bounds) = constraints.prescribed_and_bounds(&[upper, lower], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{constraints:?}") };
         assert_eq!((bound.normal, bound.lower, bound.upper), (n, -lower, upper));
         bound.is_equality()
@@ -175,7 +175,7 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     let mut rows = [prescribed([1.0, 0.0]), gap([0.6, -0.8]), gap([0.8, 0.6])];
     let constraints = Constraints::new(&origin, &mut rows, &[0.0, 0.2, 0.1]).unwrap();
     for v in [-0.3, 0.0, 0.15] {
-        let (_, bounds) = constraints.pose(&[v, 0.2, 0.1], &origin).unwrap();
+        let (_, bounds) = constraints.prescribed_and_bounds(&[v, 0.2, 0.1], &origin).unwrap();
         let [bound] = &bounds[..] else { panic!("{bounds:?}") };
         // The unknown is the first row's normal displacement.
         let u_y = |c: f64| (0.6 * v - c) / 0.8;
@@ -184,7 +184,7 @@ fn two_normals_at_a_node_with_a_prescribed_direction_bound_its_other_unknown() {
     }
     // Carried further there is no room between them.
     assert!(matches!(
-        constraints.pose(&[0.5, 0.2, 0.1], &origin),
+        constraints.prescribed_and_bounds(&[0.5, 0.2, 0.1], &origin),
         Err(ConstraintError { at: [0.0, 0.0], conflict: Conflict::NoRoom(_) })
     ));
 }
@@ -196,14 +196,19 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
         let normal = |side: f64| [side * half.sin(), -half.cos()];
         let of_line = |side| if bounds == 1 { [0.0, -2.0] } else { normal(side) };
         let face = |side, gap: f64| {
-            (0, Face { of_line: of_line(side), ..Face::plane(normal(side), 2.0) }, gap)
+            (
+                0,
+                BoundaryFace { of_line: of_line(side), ..BoundaryFace::plane(normal(side), 2.0) },
+                gap,
+            )
         };
         let joined = joined_faces([face(-1.0, 0.1), face(1.0, 0.2)]).remove(&0).unwrap();
-        let row = |(face, gaps): (Face, Vec<f64>)| {
+        let row = |(face, gaps): (BoundaryFace, Vec<f64>)| {
             let tributary_length = Some(face.length);
-            (Row { node: 0, direction: face.normal, tributary_length }, gaps)
+            (NodalConstraint { node: 0, direction: face.normal, tributary_length }, gaps)
         };
-        let (mut rows, gaps): (Vec<Row>, Vec<Vec<f64>>) = joined.into_iter().map(row).unzip();
+        let (mut rows, gaps): (Vec<NodalConstraint>, Vec<Vec<f64>>) =
+            joined.into_iter().map(row).unzip();
         assert_eq!(gaps.concat(), [0.1, 0.2]);
         let smallest: Vec<f64> = gaps.iter().map(|gaps| gaps[0]).collect();
         let constraints = Constraints::new(&[[0.0, 0.0]], &mut rows, &smallest).unwrap();
@@ -239,14 +244,14 @@ fn a_third_gap_or_a_gap_along_a_prescribed_direction_takes_no_unknown() {
         Constraints::new(&origin, &mut [prescribed([0.0, -1.0]), gap([0.0, -1.0])], &[0.0, 0.1])
             .unwrap();
     assert!(constraints.bounds.is_empty());
-    assert!(constraints.pose(&[0.1, 0.1], &origin).is_ok());
-    assert!(constraints.pose(&[0.11, 0.1], &origin).is_err());
+    assert!(constraints.prescribed_and_bounds(&[0.1, 0.1], &origin).is_ok());
+    assert!(constraints.prescribed_and_bounds(&[0.11, 0.1], &origin).is_err());
     // Prescribed the other way round, the same gap is on the other side.
     let constraints =
         Constraints::new(&origin, &mut [prescribed([0.0, 1.0]), gap([0.0, -1.0])], &[0.0, 0.1])
             .unwrap();
-    assert!(constraints.pose(&[-0.11, 0.1], &origin).is_err());
-    assert!(constraints.pose(&[0.11, 0.1], &origin).is_ok());
+    assert!(constraints.prescribed_and_bounds(&[-0.11, 0.1], &origin).is_err());
+    assert!(constraints.prescribed_and_bounds(&[0.11, 0.1], &origin).is_ok());
 }
 
 #[test]

@@ -60,7 +60,11 @@ fn forces_that_balance_have_a_scale_and_need_no_finer_mesh() {
     for (mesh, text) in bodies {
         let (scene, triangles) = (scene(&format!("{material} {text}")), mesh.triangles.len());
         let found = adapted(&scene, mesh.clone(), 0.02);
-        assert!(found.short.is_none() && found.rounds == 1, "{:?}\n{text}", found.short);
+        assert!(
+            found.not_reached.is_none() && found.rounds == 1,
+            "{:?}\n{text}",
+            found.not_reached
+        );
         assert_eq!(found.mesh.triangles.len(), triangles, "{text}");
         for bar in found.measured.bars {
             assert!(bar.bar <= 1e-6 * bar.scale, "{bar:?}\n{text}");

@@ -11,7 +11,7 @@ pub use load::DrivenMotion;
 pub use nonnegative::nonnegative;
 pub(crate) use until_contact::{rigid_motion_until_contact, unconstrained_motions};
 
-use super::{Bound, Constraints, Row};
+use super::{Bound, Constraints, NodalConstraint};
 use crate::fem::{Body, RigidMotion, resultant};
 use nalgebra::{DMatrix, DVector};
 
@@ -44,11 +44,11 @@ impl RigidMotions {
     /// Prescribed displacements are rows r·v = 0 for the coordinates v of a motion ([`RigidMotion::new`]).
     /// They allow the null space of Σ r rᵀ. The free motions in it are also in the null space of u·ν at the
     /// gap conditions.
-    pub fn new(body: &Body, rows: &[Row], normal_errors: &[f64]) -> Self {
+    pub fn new(body: &Body, rows: &[NodalConstraint], normal_errors: &[f64]) -> Self {
         let points = &body.nodes.points;
         let ([cx, cy], radius) = (body.centroid, body.radius_of_gyration());
         let mut gram = DMatrix::zeros(3, 3);
-        let of = |row: &Row| (row.node, row.direction);
+        let of = |row: &NodalConstraint| (row.node, row.direction);
         let axes: Vec<_> = rows.iter().filter(|row| !row.is_gap()).map(of).collect();
         let normals: Vec<_> = rows.iter().filter(|row| row.is_gap()).map(of).collect();
         for &(node, d) in &axes {

@@ -7,7 +7,7 @@ use super::{Anderson, ContactReport, ContactSolver, SolverEntry};
 use crate::{
     ROUNDING,
     contact::{Bound, ContactError, ContactProblem, Kkt},
-    linear::{Condensed, LinearSolver, LinearSystem},
+    linear::{CondensedSystem, LinearSolver, LinearSystem},
     petsc::{Matrix, Vector},
 };
 use omega::estimate_omega;
@@ -159,7 +159,7 @@ impl FixedPoint<'_> {
         problem: &ContactProblem,
         p: &[f64],
         start: &[f64],
-        condensed: &mut Condensed,
+        condensed: &mut CondensedSystem,
         report: &mut ContactReport,
     ) -> Result<Vec<f64>, ContactError> {
         // The condensed unknowns are x = Bu − Bc: (S + ωW) x = b − W (q + ω Bc).

@@ -4,7 +4,7 @@ use super::{ContactReport, ContactSolver, SolverEntry};
 use crate::{
     contact::{Bound, ContactError, ContactProblem},
     linear::{Factor, LinearSolver, Reduction},
-    petsc::{BoundedQuadratic, KeptPreconditioner, Matrix, PetscError, TaoReport, Vector},
+    petsc::{BoundedQuadratic, Matrix, PetscError, ShellPreconditioner, TaoReport, Vector},
 };
 use std::iter;
 
@@ -62,7 +62,7 @@ impl Tao {
     fn minimise(
         &self,
         problem: &ContactProblem,
-        (tao, kept): (&mut BoundedQuadratic, &mut TaoPreconditioner),
+        (tao, preconditioner): (&mut BoundedQuadratic, &mut TaoPreconditioner),
         proximal: f64,
         unit: f64,
         c: &mut Vector,
@@ -88,7 +88,7 @@ impl Tao {
         let mut x = vector(start.iter().map(|c| c / unit).collect())?;
         let goal = (problem.linear_residual() / force, ITERATIONS);
         let bounds = [&lower, &upper];
-        let answer = tao.minimise(kept.k, &load, bounds, &mut x, goal, kept);
+        let answer = tao.minimise(preconditioner.k, &load, bounds, &mut x, goal, preconditioner);
         let method = self.method();
         let answer = answer.map_err(|source| ContactError::Failed { method, source })?;
         c.write(|c| x.read(|x| c.iter_mut().zip(x).for_each(|(c, x)| *c = x * unit)))??;
@@ -120,16 +120,16 @@ impl ContactSolver for Tao {
             factor.set_condensed(&stiffness, iter::empty())?;
         }
         let mut tao = BoundedQuadratic::new(problem.session, &self.kind)?;
-        let mut kept = TaoPreconditioner { k: &stiffness, factor };
+        let mut preconditioner = TaoPreconditioner { k: &stiffness, factor };
         let mut report = ContactReport::default();
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         let (reason, residuals) = loop {
-            let factorisations = kept.factor.factorisations();
-            let call = (&mut tao, &mut kept);
+            let factorisations = preconditioner.factor.factorisations();
+            let call = (&mut tao, &mut preconditioner);
             let answer = self.minimise(problem, call, proximal, unit, c)?;
             report.iterations += answer.iterations;
             report.linear_iterations += answer.linear_iterations;
-            report.factorisations += kept.factor.factorisations() - factorisations;
+            report.factorisations += preconditioner.factor.factorisations() - factorisations;
             let found = problem.max_norm(c)?;
             if found > 0.0 {
                 (unit, *warm) = (found, vec![found]);
@@ -175,7 +175,7 @@ struct TaoPreconditioner<'a> {
 
 /// Every new operator begins a solve. Where bounds are active it is K with the rows and columns of their
 /// unknowns set to 0 but for the diagonal; or, of some types, without them: then it has a factor of its own.
-impl KeptPreconditioner for TaoPreconditioner<'_> {
+impl ShellPreconditioner for TaoPreconditioner<'_> {
     fn set_up(&mut self, operator: &Matrix) -> Result<bool, PetscError> {
         let (k, factor) = (self.k, &mut *self.factor);
         let rows = operator.size()?;

@@ -99,7 +99,7 @@ impl<'a> Round<'a> {
         &self,
         measured: Option<&Measurement>,
         rounds: usize,
-        short: Option<String>,
+        not_reached: Option<String>,
     ) -> Adapted {
         let worst = |measured: &Measurement| {
             let errors = measured.errors(&self.scene.accuracy_of).into_iter();
@@ -121,7 +121,7 @@ impl<'a> Round<'a> {
             },
             measured: measured.map_or_else(Measured::default, Measurement::result),
             worst: measured.and_then(worst),
-            short,
+            not_reached,
         }
     }
 

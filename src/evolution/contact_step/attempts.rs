@@ -31,14 +31,15 @@ impl ContactStep<'_> {
         let mut report = ContactReport::default();
         loop {
             attempt += 1;
-            let (lift, bounds) = self.next.reference.pose(&problem.constraints, case);
+            let (c_prescribed, bounds) =
+                self.next.reference.prescribed_and_bounds(&problem.constraints, case);
             let known = (force_scale, unbalanced.take());
-            let solved = match self.solve_contact(case, &lift, &bounds, tolerance, known) {
+            let solved = match self.solve_contact(case, &c_prescribed, &bounds, tolerance, known) {
                 // All ranks know that the method stopped short. Any other error may concern one rank only.
                 Err(error) if !error.stopped_short() => return Err(failed(error)),
                 solved => solved,
             };
-            let u = displacement(problem, lift, &self.c)?;
+            let u = displacement(problem, c_prescribed, &self.c)?;
             let candidate = self.phases.time("certificate", || self.certify(u, case));
             let certified = candidate.kkt.within(required);
             // The change by a solve for the residual forces is the error of the answer before.

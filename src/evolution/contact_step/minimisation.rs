@@ -9,17 +9,17 @@ use crate::{
 
 /// The force scale is at least this fraction of the forces if prescribed displacements or obstacles move their own
 /// nodes alone. Smaller forces are rounding.
-const LIFTED: f64 = 1e-2;
+const MOVED_ALONE: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26) for the load f − K u_D, with u_D = `lift` the prescribed unknowns.
+    /// Replaces c by the solution of (26) for the load f − K u_D, with u_D = `c_prescribed` the prescribed unknowns.
     ///
     /// The certificate of the previous answer c may give the force scale F, `known_scale`, and the residual forces
     /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.
     pub(super) fn solve_contact(
         &mut self,
         case: &LoadCase,
-        lift: &[f64],
+        c_prescribed: &[f64],
         bounds: &[Bound],
         tolerance: f64,
         (known_scale, unbalanced): (Option<f64>, Option<Vec<f64>>),
@@ -27,7 +27,8 @@ impl ContactStep<'_> {
         let comm = self.problem.body.nodes.partition.comm();
         let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
         let overlaps = comm.any(!bounds.iter().all(admits_zero));
-        let (load, force) = self.load_and_scale(&case.load, lift, overlaps.then_some(bounds));
+        let (load, force) =
+            self.load_and_scale(&case.load, c_prescribed, overlaps.then_some(bounds));
         let force = known_scale.map_or(force, |known| force.min(known));
         let bases = &self.problem.constraints.bases;
         let in_unknowns = |mut force: Vec<f64>| {
@@ -66,11 +67,11 @@ impl ContactStep<'_> {
     }
 
     /// The load f − K u_D, and its scale F: ‖f‖₂ or, if larger, a fraction of ‖f − K u_D‖₂ or of ‖K v‖₂. u_D is
-    /// `lift`. v moves the nodes that overlap an obstacle out of it and no other node. Collective.
+    /// `c_prescribed`. v moves the nodes that overlap an obstacle out of it and no other node. Collective.
     fn load_and_scale(
         &self,
         load: &[f64],
-        lift: &[f64],
+        c_prescribed: &[f64],
         overlapping: Option<&[Bound]>,
     ) -> (Vec<f64>, f64) {
         let body = &self.problem.body;
@@ -80,27 +81,27 @@ impl ContactStep<'_> {
             self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u)
         };
         let (mut load, mut scale) = (load.to_vec(), partition.norm(load, 2));
-        if partition.comm().any(lift.iter().any(|&v| v != 0.0)) {
-            let internal = internal_force(lift.to_vec());
+        if partition.comm().any(c_prescribed.iter().any(|&v| v != 0.0)) {
+            let internal = internal_force(c_prescribed.to_vec());
             load.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-            scale = scale.max(LIFTED * partition.norm(&load, 2));
+            scale = scale.max(MOVED_ALONE * partition.norm(&load, 2));
         }
         if let Some(bounds) = overlapping {
-            let mut u = vec![0.0; lift.len()];
+            let mut u = vec![0.0; c_prescribed.len()];
             bounds.iter().for_each(|bound| u[bound.dof] = bound.nearest(0.0));
-            scale = scale.max(LIFTED * partition.norm(&internal_force(u), 2));
+            scale = scale.max(MOVED_ALONE * partition.norm(&internal_force(u), 2));
         }
         (load, scale)
     }
 }
 
-/// u from the unknowns c and the prescribed ones, `lift`, without free rigid motions. Collective.
+/// u from the unknowns c and the prescribed ones, `c_prescribed`, without free rigid motions. Collective.
 pub(super) fn displacement(
     problem: &DiscreteProblem,
-    lift: Vec<f64>,
+    c_prescribed: Vec<f64>,
     c: &Vector,
 ) -> Result<Vec<f64>, PetscError> {
-    let mut u = lift;
+    let mut u = c_prescribed;
     c.read(|c| u.iter_mut().zip(c).for_each(|(u, c)| *u += c))?;
     problem.constraints.bases.displacement_to_global(&mut u);
     problem.body.nodes.partition.update(&mut u, 2)?;

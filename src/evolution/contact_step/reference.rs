@@ -25,16 +25,20 @@ impl Reference {
     }
 
     /// The prescribed unknowns and the bounds, measured from the reference.
-    pub(super) fn pose(&self, of: &Constraints, case: &LoadCase) -> (Vec<f64>, Vec<Bound>) {
-        let (mut lift, mut bounds) = (case.lift.clone(), case.bounds.clone());
+    pub(super) fn prescribed_and_bounds(
+        &self,
+        of: &Constraints,
+        case: &LoadCase,
+    ) -> (Vec<f64>, Vec<Bound>) {
+        let (mut c_prescribed, mut bounds) = (case.c_prescribed.clone(), case.bounds.clone());
         if !self.is_zero() {
-            of.prescribed().for_each(|dof| lift[dof] -= self.unknowns[dof]);
+            of.prescribed().for_each(|dof| c_prescribed[dof] -= self.unknowns[dof]);
             for bound in &mut bounds {
                 bound.lower -= self.unknowns[bound.dof];
                 bound.upper -= self.unknowns[bound.dof];
             }
         }
-        (lift, bounds)
+        (c_prescribed, bounds)
     }
 
     /// Adds `sign` times the motion to the free unknowns c: −1 changes to the reference, 1 back to zero.

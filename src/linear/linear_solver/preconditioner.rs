@@ -5,7 +5,7 @@ use super::LinearSolver;
 use crate::{
     linear::{Factor, LinearSystem, Precision, factor::VERY_LARGE},
     petsc::{
-        KeptPreconditioner, Matrix, Pattern, PetscError, Session, Vector, has_option,
+        Matrix, Pattern, PetscError, Session, ShellPreconditioner, Vector, has_option,
         set_default_option,
     },
 };
@@ -75,7 +75,7 @@ impl LinearSolver {
             self.ksp.set_preconditioner(kind, if serial { c"cholmod" } else { c"mumps" })?;
         }
         self.ksp.set_from_options()?;
-        self.ksp.is_kept()
+        self.ksp.uses_own_factor()
     }
 
     /// Can [`Self::condense`] reduce a system with this matrix to the condensed unknowns? Collective.
@@ -110,12 +110,12 @@ impl LinearSolver {
     /// Prescribes unknowns in a copy of the matrix. A condensed factor needs no copy: it prescribes them
     /// itself.
     pub(super) fn modify(&mut self, system: LinearSystem) -> Result<(), PetscError> {
-        let kept = self.modified.take();
+        let before = self.modified.take();
         let Some(prescribed) = system.prescribed else { return Ok(()) };
         if self.is_condensed(system.matrix)? {
             return Ok(());
         }
-        let mut matrix = match kept {
+        let mut matrix = match before {
             Some(matrix) => matrix,
             None => system.matrix.duplicate()?,
         };
@@ -156,14 +156,14 @@ impl LinearSolver {
 }
 
 /// The factor during a solve; its time is booked.
-pub(super) struct Booked<'a> {
+pub(super) struct TimedFactor<'a> {
     pub(super) factor: &'a mut Factor,
     /// P⁻¹ r of the first residual, if it is known.
     pub(super) first: Option<&'a Vector>,
     pub(super) system: LinearSystem<'a>,
 }
 
-impl KeptPreconditioner for Booked<'_> {
+impl ShellPreconditioner for TimedFactor<'_> {
     /// The linear solver decides when to factorise.
     fn set_up(&mut self, _matrix: &Matrix) -> Result<bool, PetscError> {
         Ok(self.factor.exists())

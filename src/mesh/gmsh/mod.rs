@@ -1,6 +1,6 @@
 //! Meshes `.geo` files with the gmsh command line.
 
-mod kept;
+mod cache;
 mod process;
 
 use process::note;
@@ -11,7 +11,7 @@ use super::{
     msh::{parse, parse_made, read},
 };
 use crate::whole_file;
-use kept::Inputs;
+use cache::Inputs;
 use std::{collections::BTreeMap, ffi::OsString, fs, io, path::Path};
 
 /// Reads a `.msh`, or meshes a `.geo` with gmsh unless this was done before, and sorts nodes and triangles
@@ -101,16 +101,16 @@ fn mesh_geo(
     let (arguments, last) = (arguments(parameters), last_words(&text, parameters, order));
     let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
     let digest = inputs.digest(&arguments, &last);
-    let kept = fs::read(&path);
-    let gmsh = kept::program();
-    let origin = kept.as_ref().ok().and_then(|file| kept::origin(file));
-    if let (Ok(file), Some([made_from, made_by])) = (&kept, origin)
+    let cached = fs::read(&path);
+    let gmsh = cache::program();
+    let origin = cached.as_ref().ok().and_then(|file| cache::origin(file));
+    if let (Ok(file), Some([made_from, made_by])) = (&cached, origin)
         && made_from == digest
         && inputs.are_all
     {
         let mesh = parse(file, &path)?;
         let is_same = gmsh.as_ref().is_none_or(|gmsh| gmsh == made_by);
-        if is_same || kept::version().is_none_or(|version| mesh.gmsh == Some(version)) {
+        if is_same || cache::version().is_none_or(|version| mesh.gmsh == Some(version)) {
             return Ok(mesh);
         }
     }
@@ -119,7 +119,7 @@ fn mesh_geo(
     let is_free = fs::symlink_metadata(&path).is_err();
     if is_free || origin.is_some() {
         let origin = [&*digest, &gmsh.unwrap_or_default()];
-        let signed = [&bytes, kept::signature(&bytes, origin).as_bytes()].concat();
+        let signed = [&bytes, cache::signature(&bytes, origin).as_bytes()].concat();
         if let Err(error) = whole_file::write(&path, &signed, |_| Ok(())) {
             note(&path, &format!("it cannot be written ({error}), so that every run meshes anew"));
         }
@@ -189,7 +189,7 @@ fn bounds_by_size(text: &str) -> bool {
 /// parameter, and they set the order and the largest size. (Options of the command line would give way to
 /// those in the `.geo`.)
 fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> String {
-    let kept = parameters.iter().map(|(name, value)| {
+    let checks = parameters.iter().map(|(name, value)| {
         format!(
             "If ({name} != {value})\n Error(\"`{name}` = {value}: the .geo file assigns it, which \
              overrules this value; write DefineConstant[ … ] there\");\nEndIf\n"
@@ -198,7 +198,7 @@ fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> S
     let order = if order == Order::Quadratic { "Mesh.ElementOrder = 2;\n" } else { "" };
     let size = parameters.get("size").filter(|_| !bounds_by_size(text));
     let size = size.map_or(String::new(), |size| format!("Mesh.MeshSizeMax = {size};\n"));
-    kept.chain([order.to_owned(), size]).collect()
+    checks.chain([order.to_owned(), size]).collect()
 }
 
 /// gmsh's arguments for a mesh with these parameters.

@@ -5,7 +5,7 @@ use super::parts::{
 };
 use crate::{
     fem::{Body, Edge, GAUSS, Subdomain, TriangleParts, add_body_force, add_traction, parabola},
-    mesh::{CHORDS, Face},
+    mesh::{BoundaryFace, CHORDS},
     problem::boundary_conditions::Traction,
     scene::{Expression, Scene, SurfaceLoad},
 };
@@ -132,9 +132,9 @@ fn smooth_halves(edges: &[Edge], points: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
         let [x, y] = edge.tangent(points, s);
         let length = x.hypot(y);
         let weight = if edge.middle.is_some() { length * length } else { length };
-        (length, Face::plane([y / length, -x / length], weight))
+        (length, BoundaryFace::plane([y / length, -x / length], weight))
     };
-    let mut faces = BTreeMap::<usize, Vec<(usize, Face)>>::new();
+    let mut faces = BTreeMap::<usize, Vec<(usize, BoundaryFace)>>::new();
     for (number, edge) in edges.iter().enumerate() {
         for (node, s) in edge.ends.into_iter().zip([0.0, 1.0]) {
             faces.entry(node).or_default().push((number, end(edge, s).1));
@@ -146,7 +146,7 @@ fn smooth_halves(edges: &[Edge], points: &[[f64; 2]]) -> Vec<[[f64; 2]; 3]> {
             let mut others = faces[&edge.ends[s as usize]].iter();
             let (_, other) = others.find(|(n, face)| *n != number && face.angle(&own) <= CHORDS)?;
             let swapped = [(own, other.length), (*other, own.length)];
-            let [own_part, part] = swapped.map(|(face, length)| Face { length, ..face });
+            let [own_part, part] = swapped.map(|(face, length)| BoundaryFace { length, ..face });
             let [nx, ny] = own_part.joined(&part).normal;
             Some([length * (own.normal[1] - ny), length * (nx - own.normal[0])])
         });

@@ -2,7 +2,7 @@
 
 use crate::{
     contact::{Bound, ContactProblem, ContactReport, rigid_motion_until_contact},
-    linear::Condensed,
+    linear::CondensedSystem,
     petsc::{PetscError, Vector},
 };
 
@@ -196,7 +196,7 @@ pub(super) fn pivot_condensed(
     problem: &ContactProblem,
     active: &mut [f64],
     start: &AtBounds,
-    condensed: &mut Condensed,
+    condensed: &mut CondensedSystem,
     report: &mut ContactReport,
 ) -> Result<bool, PetscError> {
     let mut pivoting = Pivoting::new(problem);

@@ -1,9 +1,9 @@
-//! Displacement conditions at nodes, as posed and as bounds on unknowns.
+//! Displacement conditions at nodes, as in the scene and as bounds on unknowns.
 
-/// A condition on the displacement of a node, with a value that may depend on time: u·d is prescribed (a component, or
-/// 0 across a symmetry axis), or at a node of Γ_C u·d is at most the gap, with d = ν.
+/// A constraint on the displacement u of a node, a row of the constraint matrix. Its value may depend on time. u·d is
+/// prescribed (a component, or 0 across a symmetry axis), or at a node of Γ_C u·d is at most the gap, with d = ν.
 #[derive(Debug, Clone, Copy)]
-pub struct Row {
+pub struct NodalConstraint {
     /// The node.
     pub node: usize,
     /// d, a unit vector.
@@ -12,7 +12,7 @@ pub struct Row {
     pub tributary_length: Option<f64>,
 }
 
-impl Row {
+impl NodalConstraint {
     /// Is it the condition of a gap?
     pub fn is_gap(&self) -> bool {
         self.tributary_length.is_some()

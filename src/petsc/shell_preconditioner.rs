@@ -1,4 +1,5 @@
-//! Our kept Cholesky factor as a PC type of PETSc (PCRegister).
+//! Preconditioners of our own as a PC type of PETSc (PCRegister, PCSHELL): the Cholesky factor that is kept for later
+//! matrices.
 
 use super::{
     Matrix, PetscError, Vector, check,
@@ -16,7 +17,7 @@ pub(crate) const NAME: &CStr = c"kept";
 const DESCRIPTION: &CStr = c"Cholesky factor, kept for later matrices";
 
 /// The preconditioner P that KSP and TAO call through the PC type [`NAME`] during a solve.
-pub(crate) trait KeptPreconditioner {
+pub(crate) trait ShellPreconditioner {
     /// Makes P from a matrix that is new or has new values; false if it is not positive definite.
     fn set_up(&mut self, matrix: &Matrix) -> Result<bool, PetscError>;
 
@@ -26,7 +27,7 @@ pub(crate) trait KeptPreconditioner {
 
 /// The application context of the PC during a call.
 pub(super) struct Context<'a> {
-    pub(super) preconditioner: &'a mut dyn KeptPreconditioner,
+    pub(super) preconditioner: &'a mut dyn ShellPreconditioner,
 }
 
 impl Context<'_> {
