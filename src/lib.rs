@@ -69,7 +69,7 @@
 //! ∫ ζₙ𝒜ε(uₙ)·ε(v − uₙ) ≥ the work of the loads at tₙ on v − uₙ                    (26)
 //! ```
 //!
-//! (27) is (26) at t = 0. A run stops when min ζ reaches ζ_*. Start reading at [`evolution::run`].
+//! (27) is (26) at t = 0. A run stops when min ζ reaches ζ_*. Start reading at `Run::step` in [`evolution`].
 //!
 //! The modules below are listed in the order of their dependence: each uses only those above it.
 #![deny(unsafe_code)]

@@ -143,19 +143,9 @@ impl ContactError {
         Self::NotConverged { method, report, residuals, detail: detail.into() }
     }
 
-    /// Did the method stop above its tolerance? All ranks know this error.
-    pub fn stopped_short(&self) -> bool {
-        matches!(self, Self::NotConverged { .. })
-    }
-
     /// Did the method miss a tolerance that rounding allows? Other settings may help.
     pub fn is_missed(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::NotCertified { .. })
-    }
-
-    /// Does rounding keep the answer from the tolerance?
-    pub fn is_limited(&self) -> bool {
-        matches!(self, Self::Limited { .. })
     }
 
     /// May another method succeed? All ranks return the same, so an error inside PETSc counts only on one

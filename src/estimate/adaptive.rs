@@ -16,7 +16,6 @@
 //! `sizes` turns errors into the sizes of triangles.
 
 mod changes;
-mod finer;
 mod limits;
 mod measurement;
 mod few_step_run;

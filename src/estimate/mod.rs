@@ -15,7 +15,6 @@
 //! and returns the [`Outcome`] with the estimates. `command` requests this, an adapted mesh and error bars. Nothing
 //! here changes the answer of a run.
 
-mod hierarchical;
 mod recovery;
 mod extremes;
 mod error_budget;
@@ -37,7 +36,8 @@ use crate::{
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
 
-/// [`evolution::run`](crate::evolution::run), and at its end the estimates of its errors.
+/// Solves Problem VP^hk with the contact solver called `solver`, and estimates the errors of the answer at the end.
+/// `accepted` is called for every accepted step.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.

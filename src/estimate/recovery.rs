@@ -1,11 +1,10 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
-use super::hierarchical::{coefficients, mass};
 use crate::{
     fem::{Body, Elasticity, Fit, Patches, for_elements, monomials},
     petsc::PetscError,
 };
-use nalgebra::{Matrix6x3, Vector3};
+use nalgebra::{Matrix6, Matrix6x3, Vector3};
 
 /// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
 #[derive(Debug, Clone)]
@@ -65,9 +64,9 @@ impl<'a> RecoveredStrains<'a> {
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;
             // ∫ e_i e_j of the components of e = ε* − ε(u).
             let difference = self.difference(t).map(|strain| strain.transpose());
-            let difference = coefficients(Matrix6x3::from_rows(&difference));
-            let products = difference.transpose() * mass(&body.triangles[t]) * difference;
-            mean * elasticity.d(body, t).dot(&products)
+            let difference = Matrix6x3::from_rows(&difference);
+            let products = difference.transpose() * mass() * difference;
+            mean * body.triangles[t].area() * elasticity.d(body, t).dot(&products)
         };
         let squares: Vec<f64> = (0..body.own_triangles).map(square).collect();
         let points = per_triangle * body.own_triangles;
@@ -112,4 +111,17 @@ fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {
             [0, 1, 2].map(|i| 2.0 * points[i] - sum / 3.0)
         }
     }
+}
+
+/// ∫ N_i N_j / |T| of the quadratic shape functions on a straight triangle: of the vertices, and of the midpoints of
+/// the sides 01, 12, 20.
+fn mass() -> Matrix6<f64> {
+    Matrix6::from_fn(|i, j| match (i.min(j), i.max(j)) {
+        (i, j) if i == j => [6.0, 32.0][i / 3],
+        (..3, ..3) => -1.0,
+        // The side with the midpoint j does not end at the vertex i.
+        (i, j @ 3..) if i == (j - 1) % 3 => -4.0,
+        (..3, _) => 0.0,
+        _ => 16.0,
+    }) / 180.0
 }

@@ -20,7 +20,7 @@
 //! an affine function, and η_*(ζ) enters by its mean over the vertices. For quadratic displacements, φ and
 //! η_*(ζ)𝒜ε(u) are evaluated at three quadrature points.
 //!
-//! [`run`] is this loop. [`ContactStep`] solves and certifies (26), `DamageStep` solves (28), and `StepController`
+//! `all_steps` is this loop, and `Run::step` one of its steps. [`ContactStep`] solves and certifies (26), `DamageStep` solves (28), and `StepController`
 //! plans each step and accepts or rejects it; steps are uniform or adaptive.
 //!
 //! What crosses the door: `command` starts a run of a [`DiscreteProblem`] with an [`Observer`], which sees every
@@ -62,27 +62,12 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use step_controller::{Decision, StepState};
 
-/// Solves Problem VP^hk with the contact solver called `solver`; `accepted` is called for every accepted step.
-/// The outcome has no error estimates; [`estimate::run`](crate::estimate::run) adds them.
+/// Solves Problem VP^hk with the contact solver called `solver`. The `observer` sees every accepted step, and may keep
+/// checkpoints and end the run. It starts from `saved`, if given. Adaptive steps end at the times `followed` of another
+/// run. Everything at the end is returned, without error estimates.
 ///
 /// # Errors
 /// See [`RunError`]; every accepted step has been seen by then.
-pub fn run(
-    session: &Session,
-    problem: &DiscreteProblem,
-    solver: &str,
-    phases: &Phases,
-    accepted: &mut dyn FnMut(&Step) -> Observed,
-) -> Result<Outcome, RunError> {
-    let observer = &mut Callback(accepted);
-    all_steps(session, problem, solver, phases, observer, None, &[]).map(|run| run.outcome)
-}
-
-/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given. Adaptive
-/// steps end at the times `followed` of another run. Everything at the end is returned.
-///
-/// # Errors
-/// See [`run`].
 pub(crate) fn all_steps<'a>(
     session: &'a Session,
     problem: &'a DiscreteProblem,

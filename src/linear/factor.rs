@@ -32,22 +32,14 @@ use std::mem::take;
 /// the part (ζ − ζ₀)/ζ₀ of such forces would remain.
 pub struct Factor {
     comm: Communicator,
-    /// The precision of the factor of a substructure.
-    precision: Precision,
     /// The number of rows of the matrices to condense, and the owned unknowns that [`Self::prescribe`] may
     /// prescribe.
     condensed: (usize, Vec<usize>),
     /// The number of rows of its matrices, and the factor. `None` if the matrices or their interface are too
     /// large.
     substructure: Option<(usize, Option<Box<Substructure>>)>,
-    /// `None` before the first factorisation and after a failed one.
-    policy: Option<RefactorisationPolicy>,
-    /// Applications in the present solve.
-    applications: usize,
-    /// Factorisations that succeeded.
-    factorisations: usize,
-    /// The values of the last factored matrix. A restart makes the same factor from them.
-    values: Vec<f64>,
+    /// The state that checkpoints keep.
+    state: FactorState,
     /// E^½.
     scaling: Scaling,
     /// Was a checkpoint loaded whose factor must still be made?
@@ -66,13 +58,9 @@ impl Factor {
     pub fn new(session: &Session, precision: Precision) -> Self {
         Self {
             comm: session.comm(),
-            precision,
             condensed: (0, Vec::new()),
             substructure: None,
-            policy: None,
-            applications: 0,
-            factorisations: 0,
-            values: Vec::new(),
+            state: FactorState::new(precision),
             scaling: Scaling::default(),
             loaded: false,
         }
@@ -93,7 +81,7 @@ impl Factor {
         let before = self.substructure.take();
         if before.as_ref().is_none_or(|(size, _)| *size != rows) && !self.loaded {
             // The factor of another matrix, or a preconditioner of PETSc, is none for this one.
-            self.policy = None;
+            self.state.policy = None;
         }
         let substructure = match before {
             Some((size, substructure)) if size == rows => substructure,
@@ -101,7 +89,7 @@ impl Factor {
             _ => {
                 let (of_rows, condensed) = &self.condensed;
                 let last = if *of_rows == rows { &condensed[..] } else { &[] };
-                Substructure::new(self.comm, matrix, last, self.precision)?.map(Box::new)
+                Substructure::new(self.comm, matrix, last, self.state.precision)?.map(Box::new)
             }
         };
         let possible = substructure.is_some();
@@ -133,7 +121,7 @@ impl Factor {
         // An iteration reads the factor and the entries of the matrix with their columns.
         let iteration = comm.max(factor.bytes() + 12.0 * entries);
         // A restart needs the same precision.
-        self.precision = factor.precision();
+        self.state.precision = factor.precision();
         self.record(matrix, definite, Some(work / iteration.max(1.0)))?;
         Ok(definite)
     }
@@ -145,13 +133,13 @@ impl Factor {
         definite: bool,
         cost: Option<f64>,
     ) -> Result<(), PetscError> {
-        matrix.read_entries(&mut self.values)?;
+        matrix.read_entries(&mut self.state.values)?;
         self.scaling = Scaling::of_factored(matrix)?;
         let cost = cost.unwrap_or(UNKNOWN_COST);
-        self.policy = definite.then(|| RefactorisationPolicy::new(cost));
+        self.state.policy = definite.then(|| RefactorisationPolicy::new(cost));
         // A new factor replaces that of a checkpoint.
         self.loaded = false;
-        self.factorisations += usize::from(definite);
+        self.state.factorisations += usize::from(definite);
         Ok(())
     }
 
@@ -182,7 +170,7 @@ impl Factor {
 
     /// Counts an application to `r`. There must be a factor for vectors of this size.
     fn start_application(&mut self, r: &Vector) -> Result<(), PetscError> {
-        self.applications += 1;
+        self.state.applications += 1;
         if self.exists() && r.owned() == self.scaling.rows() { Ok(()) } else { Err(missing()) }
     }
 
@@ -211,12 +199,12 @@ impl Factor {
 
     /// The number of successful factorisations.
     pub fn factorisations(&self) -> usize {
-        self.factorisations
+        self.state.factorisations
     }
 
     /// Is there a factor?
     pub(crate) fn exists(&self) -> bool {
-        self.policy.is_some()
+        self.state.policy.is_some()
     }
 
     /// Is there no factor, or does a new one cost less?
@@ -227,13 +215,13 @@ impl Factor {
     /// The largest number of iterations for a solve with this factor that divides the residual by e^`asked`.
     /// `None` if there is no factor or a new one is due.
     pub(crate) fn iteration_limit(&self, asked: f64) -> Option<usize> {
-        self.policy.as_ref().and_then(|policy| policy.iteration_limit(asked))
+        self.state.policy.as_ref().and_then(|policy| policy.iteration_limit(asked))
     }
 
     /// Records the iterations of a solve, or the counted applications, for the refactorisation policy.
     pub(crate) fn end_solve(&mut self, iterations: Option<usize>, reduction: Reduction) {
-        let applications = take(&mut self.applications);
-        if let Some(policy) = &mut self.policy {
+        let applications = take(&mut self.state.applications);
+        if let Some(policy) = &mut self.state.policy {
             policy.solved(iterations.unwrap_or(applications), reduction);
         }
     }

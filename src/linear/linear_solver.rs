@@ -87,31 +87,8 @@ impl LinearSolver {
         &mut self.factor
     }
 
-    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with the present
-    /// preconditioner. Without a preconditioner `x` does not change.
-    ///
-    /// # Errors
-    /// PETSc failed. The report says whether the limit was reached.
-    pub fn solve(
-        &mut self,
-        system: LinearSystem,
-        b: &Vector,
-        x: &mut Vector,
-        limit: f64,
-    ) -> Result<SolveReport, PetscError> {
-        if !self.is_ready(system)? {
-            return Ok(SolveReport::default());
-        }
-        let converged = self.start(system, b, x, limit)?;
-        let mut report = SolveReport { converged, ..SolveReport::default() };
-        if !converged {
-            self.iterate(system, x, (limit, None), &mut report)?;
-        }
-        Ok(report)
-    }
-
-    /// As [`Self::solve`], but with a new preconditioner if one is due or the old one needs too many
-    /// iterations. The solve misses the limit only if the system is not positive definite or too
+    /// Solves from the start `x` until ‖b − A x‖₂ ≤ `limit` on the free unknowns, with a new preconditioner if one is
+    /// due or the old one needs too many iterations. The solve misses the limit only if the system is not positive definite or too
     /// ill-conditioned.
     ///
     /// # Errors

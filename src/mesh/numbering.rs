@@ -44,17 +44,7 @@ impl Mesh {
 
 /// The bits of a number with a zero bit before each of them.
 fn spread(number: u32) -> u64 {
-    let mut bits = u64::from(number);
-    for (shift, mask) in [
-        (16, 0x0000_ffff_0000_ffff),
-        (8, 0x00ff_00ff_00ff_00ff),
-        (4, 0x0f0f_0f0f_0f0f_0f0f),
-        (2, 0x3333_3333_3333_3333),
-        (1, 0x5555_5555_5555_5555),
-    ] {
-        bits = (bits | bits << shift) & mask;
-    }
-    bits
+    (0..32).fold(0, |bits, i| bits | u64::from(number >> i & 1) << (2 * i))
 }
 
 /// The place of each number in a permutation.

@@ -210,8 +210,7 @@ impl Ksp {
         // SAFETY: a name in PETSc's constant table.
         let reason = unsafe { CStr::from_ptr(reason) }.to_str().ok();
         let reason = reason.filter(|_| !uses_own_factor);
-        let tested = test.norm;
-        let norm = match tested {
+        let norm = match test.norm {
             Some(norm) => norm,
             // Types such as preonly have no convergence test.
             None => {

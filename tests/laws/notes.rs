@@ -3,7 +3,8 @@
 use crate::support::{bent, problem, run, square, try_run};
 use signorini::{
     contact::{SOLVERS, SolverError},
-    evolution::{self, DiscreteProblem, Phases, RunError, SetupError},
+    estimate,
+    evolution::{DiscreteProblem, Phases, RunError, SetupError},
     petsc::Session,
 };
 
@@ -162,7 +163,7 @@ fn steps_off_the_fast_path_are_noted() {
 fn an_unknown_solver_is_an_error() {
     let (session, problem) = (Session::start(&[]).unwrap(), pressed(0.0, "-1").unwrap());
     for name in ["simplex", "active-set:tron", "tao:", ""] {
-        let run = evolution::run(&session, &problem, name, &Phases::default(), &mut |_| Ok(()));
+        let run = estimate::run(&session, &problem, name, &Phases::default(), &mut |_| Ok(()));
         assert!(matches!(&run, Err(RunError::Solver(SolverError { name: n })) if n == name));
     }
 }

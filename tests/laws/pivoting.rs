@@ -198,7 +198,7 @@ fn a_stiffness_that_no_factor_fits_is_left_to_the_rescuer() {
     // Nobody says that contact alone supports the beam: without node 0 its stiffness is singular.
     let untold = Small { rigid: DMatrix::zeros(3, 0), work: DVector::zeros(0), ..beam() };
     let failure = untold.try_solve("active-set", &[1.0, 1.0, 0.0]).unwrap_err();
-    assert!(failure.stopped_short(), "{failure}");
+    assert!(matches!(failure, ContactError::NotConverged { .. }), "{failure}");
     let (entry, _) = find("active-set").unwrap();
     let (c, _) = untold.solve(entry.rescuer.unwrap(), &[]);
     c.iter().zip([-1.0, 0.0, 1.0]).for_each(|(c, exact)| close(*c, exact, 1e-9));

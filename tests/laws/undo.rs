@@ -3,7 +3,8 @@
 use crate::support::{Random, close, difference, distorted, history, problem, same_iterations};
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, ContactStep, DiscreteProblem, Phases, RunError, Step},
+    estimate,
+    evolution::{ContactStep, DiscreteProblem, Phases, RunError, Step},
     petsc::Session,
 };
 
@@ -160,7 +161,7 @@ fn a_given_step_whose_contact_fails_ends_the_run_with_the_steps_before() {
     let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
     let mut times = Vec::new();
     let problem = released(uniform, limit);
-    let run = evolution::run(&session, &problem, "penalty-duality", &phases, &mut |step| {
+    let run = estimate::run(&session, &problem, "penalty-duality", &phases, &mut |step| {
         times.push(step.state.time);
         Ok(())
     });

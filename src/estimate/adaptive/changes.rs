@@ -1,23 +1,24 @@
 //! The change of the damage between a mesh and a finer one.
 
-use super::{few_step_run::FewStepRun, finer::Finer, sizes::areas};
-use crate::mesh::Mesh;
+use super::{few_step_run::FewStepRun, sizes::areas};
+use crate::mesh::{Mesh, Refinement};
 
 /// Per triangle: its share in the squared change ‖ζ_h − ζ_{h/2}‖² / ‖1 − ζ_{h/2}‖² at the end, and max |ζ_h − ζ_{h/2}|.
 /// Collective.
 pub(super) fn damage(
     mesh: &Mesh,
-    finer: &Finer,
+    finer: &Refinement,
     coarse: &FewStepRun,
     fine: &FewStepRun,
 ) -> [Vec<f64>; 2] {
-    let before = finer.interpolated(at_vertices(mesh, &coarse.zeta()));
+    let mut before = at_vertices(mesh, &coarse.zeta());
+    finer.halved_edges.iter().for_each(|&[a, b]| before.push(0.5 * (before[a] + before[b])));
     let mut largest = vec![0.0_f64; mesh.triangles.len()];
     let mut shares = largest.clone();
     let mesh = &finer.mesh;
     let now = at_vertices(mesh, &fine.zeta());
     let mut done = 0.0;
-    let parts = mesh.triangles.iter().zip(&finer.parents).zip(areas(mesh));
+    let parts = mesh.triangles.iter().zip(&finer.parent_of_triangle).zip(areas(mesh));
     for ((nodes, &parent), area) in parts {
         for &node in nodes {
             let change = now[node] - before[node];

@@ -7,14 +7,13 @@ use super::{
     AdaptError, Measured,
     changes::damage,
     few_step_run::{FEW, FewStepRun},
-    finer::Finer,
     limits::Limits,
     sequence::{Level, Sequence},
 };
 use crate::{
     estimate::Extreme,
     evolution::AIM,
-    mesh::{Mesh, Order},
+    mesh::{Mesh, Order, Refinement},
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem, Figure},
 };
@@ -114,7 +113,7 @@ impl Measurement {
             let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?;
             problem.restrict(session).map_err(AdaptError::from)
         };
-        let finer = Finer::new(mesh)?;
+        let finer = Refinement::start(mesh.clone()).refine_everywhere()?;
         let triangles = finer.mesh.triangles.len();
         let of_fine = problem(&finer.mesh)?;
         let run = || FewStepRun::run(session, &of_fine, solver, triangles, FEW, coarse.times());
@@ -138,7 +137,7 @@ impl Measurement {
         if is_decided || limits.exceeded(&[triangles]).is_some() {
             return Ok(measured);
         }
-        let finest = Finer::new(&finer.mesh)?.mesh;
+        let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
         let problem = problem(&finest)?;
         let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, coarse.times());
         if let Ok(run) = limits.measure(triangles, run) {
@@ -152,7 +151,7 @@ impl Measurement {
     fn of_fields(
         sequence: &Sequence,
         mesh: &Mesh,
-        finer: &Finer,
+        finer: &Refinement,
         coarse: &FewStepRun,
         fine: &FewStepRun,
     ) -> Self {
@@ -166,7 +165,9 @@ impl Measurement {
         let growth = if problem.scene().order == Order::Quadratic { 16.0 } else { 4.0 };
         measured.shares = vec![0.0; mesh.triangles.len()];
         measured.depths = measured.shares.clone();
-        for ((&parent, share), depth) in finer.parents.iter().zip(of_parts).zip(fine.depths()) {
+        for ((&parent, share), depth) in
+            finer.parent_of_triangle.iter().zip(of_parts).zip(fine.depths())
+        {
             measured.shares[parent] += growth * share;
             measured.depths[parent] = measured.depths[parent].max(*depth);
         }

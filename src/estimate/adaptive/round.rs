@@ -3,9 +3,8 @@
 use super::{
     Adapted, Measured,
     few_step_run::FewStepRun,
-    finer::touching,
     measurement::{Cause, Measurement},
-    sizes::{divided, influences, sharpened, size_ratios},
+    sizes::{divided, influences, sharpened, size_ratios, touching},
 };
 use crate::{
     evolution::AIM,

@@ -9,7 +9,7 @@
 //! The last term is the sum of all further changes if they fall like η. The error of a figure is a product of two errors in
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
-use super::{few_step_run::FewStepRun, finer::size_at};
+use super::{few_step_run::FewStepRun, sizes::size_at};
 use crate::{estimate::Extreme, mesh::Mesh, problem::SEEN};
 use std::f64::consts::FRAC_1_SQRT_2;
 

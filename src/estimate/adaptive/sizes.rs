@@ -3,8 +3,10 @@
 //! If the size of a triangle is multiplied by r, its error falls like r^p, with p the order, and 1/r² triangles
 //! replace it. The minimum number of triangles for a given squared error Σ r_T^2p m_T has r_T ~ m_T^(−1/(2p+2)).
 
-use super::finer::touching;
-use crate::mesh::{Mesh, MeshError, Refinement, TIES, twice_area};
+use crate::{
+    fem::ON_SIDE,
+    mesh::{Mesh, MeshError, Refinement, TIES, twice_area},
+};
 
 /// Minimum factor by which the size of a triangle is multiplied in a round.
 const MIN_RATIO: f64 = 0.125;
@@ -104,4 +106,31 @@ fn oversize(ratios: &[f64]) -> f64 {
 pub(super) fn areas(mesh: &Mesh) -> Vec<f64> {
     let corners = mesh.triangles.iter().map(|t| t.map(|node| mesh.nodes[node]));
     corners.map(|[a, b, c]| 0.5 * twice_area(a, b, c)).collect()
+}
+
+/// Per triangle: does it touch one of the points? A point outside all triangles, as beyond a chord, touches the nearest
+/// ones.
+pub(super) fn touching(mesh: &Mesh, points: &[[f64; 2]]) -> Vec<bool> {
+    let mut touching = vec![false; mesh.triangles.len()];
+    for &point in points {
+        // The smallest barycentric coordinate of the point.
+        let depth = |nodes: &[usize; 3]| {
+            let [a, b, c] = nodes.map(|node| mesh.nodes[node]);
+            let parts = [[a, b], [b, c], [c, a]].map(|[p, q]| twice_area(p, q, point));
+            parts.into_iter().fold(f64::INFINITY, f64::min) / twice_area(a, b, c)
+        };
+        let depths: Vec<f64> = mesh.triangles.iter().map(depth).collect();
+        let deepest = depths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        for (touches, depth) in touching.iter_mut().zip(depths) {
+            *touches |= depth >= deepest.min(0.0) - ON_SIDE;
+        }
+    }
+    touching
+}
+
+/// The size of the largest triangle of `mesh` that touches `point`: the side of a square of twice its area, m.
+pub(super) fn size_at(mesh: &Mesh, point: [f64; 2]) -> f64 {
+    let here = touching(mesh, &[point]);
+    let areas = areas(mesh).into_iter().zip(here).filter(|(_, touches)| *touches);
+    areas.fold(0.0, |most, (area, _)| f64::max(most, 2.0 * area)).sqrt()
 }

@@ -36,7 +36,9 @@ impl ContactStep<'_> {
             let known = (force_scale, unbalanced.take());
             let solved = match self.solve_contact(case, &c_prescribed, &bounds, tolerance, known) {
                 // All ranks know that the method stopped short. Any other error may concern one rank only.
-                Err(error) if !error.stopped_short() => return Err(failed(error)),
+                Err(error) if !matches!(error, ContactError::NotConverged { .. }) => {
+                    return Err(failed(error));
+                }
                 solved => solved,
             };
             let u = displacement(problem, c_prescribed, &self.c)?;

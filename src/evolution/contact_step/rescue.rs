@@ -1,7 +1,10 @@
 //! A second solver for steps in which the chosen solver stops short of the tolerance.
 
 use super::ContactStep;
-use crate::evolution::{RunError, Step};
+use crate::{
+    contact::ContactError,
+    evolution::{RunError, Step},
+};
 use std::mem;
 
 impl ContactStep<'_> {
@@ -24,10 +27,11 @@ impl ContactStep<'_> {
         self.rescuer.iter_mut().for_each(|other| mem::swap(&mut self.solver, other));
         // Nor can the solver use the rescuer's warm start in the next step.
         self.next.warm_start.clear();
+        let is_limited = |error: &ContactError| matches!(error, ContactError::Limited { .. });
         match rescued {
             // The first error is reported, unless only the rescuer's error states the limit by rounding.
             Err(RunError::Contact { source: further, .. })
-                if source.is_limited() || !further.is_limited() =>
+                if is_limited(source) || !is_limited(&further) =>
             {
                 solved
             }

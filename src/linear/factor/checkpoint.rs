@@ -8,40 +8,42 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::mem::take;
 
-/// The state of a factor in a checkpoint; see the fields of [`Factor`].
+/// The state of a factor that checkpoints keep.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FactorState {
-    values: Vec<f64>,
-    precision: Precision,
-    policy: Option<RefactorisationPolicy>,
-    applications: usize,
-    factorisations: usize,
+    /// The values of the last factored matrix. A restart makes the same factor from them.
+    pub(super) values: Vec<f64>,
+    /// The precision of the factor of a substructure.
+    pub(super) precision: Precision,
+    /// `None` before the first factorisation and after a failed one.
+    pub(super) policy: Option<RefactorisationPolicy>,
+    /// Applications in the present solve.
+    pub(super) applications: usize,
+    /// Factorisations that succeeded.
+    pub(super) factorisations: usize,
 }
 
-/// The history of a factor in a checkpoint, beside its matrix.
-pub(in crate::linear) struct History {
-    policy: Option<RefactorisationPolicy>,
-    factorisations: usize,
+/// The history of a factor in a checkpoint, beside its matrix: the refactorisation policy and the number of
+/// factorisations.
+pub(in crate::linear) type History = (Option<RefactorisationPolicy>, usize);
+
+impl FactorState {
+    /// Of no factor yet.
+    pub(super) fn new(precision: Precision) -> Self {
+        Self { values: Vec::new(), precision, policy: None, applications: 0, factorisations: 0 }
+    }
 }
 
 impl Factor {
     /// The state for a checkpoint.
     pub fn state(&self) -> FactorState {
-        FactorState {
-            values: self.values.clone(),
-            precision: self.precision,
-            policy: self.policy,
-            applications: self.applications,
-            factorisations: self.factorisations,
-        }
+        self.state.clone()
     }
 
     /// Restores the state of a checkpoint. The next solve makes the factor.
     pub fn set_state(&mut self, state: FactorState) {
-        let FactorState { values, precision, policy, applications, factorisations } = state;
-        self.loaded = policy.is_some();
-        (self.values, self.precision, self.policy) = (values, precision, policy);
-        (self.applications, self.factorisations) = (applications, factorisations);
+        self.loaded = state.policy.is_some();
+        self.state = state;
     }
 
     /// The matrix of a loaded factor that must still be made, with the pattern of `matrix`, and its history
@@ -54,14 +56,13 @@ impl Factor {
             return Ok(None);
         }
         let mut copy = matrix.duplicate()?;
-        copy.set_entries(&self.values)?;
-        let history = History { policy: self.policy.take(), factorisations: self.factorisations };
-        Ok(Some((copy, history)))
+        copy.set_entries(&self.state.values)?;
+        Ok(Some((copy, (self.state.policy.take(), self.state.factorisations))))
     }
 
     /// Restores the history of a factor that was made again.
     pub(in crate::linear) fn keep_history(&mut self, history: History) {
-        (self.policy, self.factorisations) = (history.policy, history.factorisations);
+        (self.state.policy, self.state.factorisations) = history;
     }
 
     /// Makes a loaded factor again, of a matrix with the pattern of this one. Collective.

@@ -17,7 +17,7 @@ impl Factor {
         let condensed = (matrix.size()?, unknowns.collect());
         if self.comm.any(condensed != self.condensed) {
             (self.condensed, self.substructure) = (condensed, None);
-            self.policy = self.policy.take().filter(|_| self.loaded);
+            self.state.policy = self.state.policy.take().filter(|_| self.loaded);
         }
         Ok(())
     }

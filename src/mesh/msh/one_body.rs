@@ -1,7 +1,7 @@
 //! Checks that the triangles make one body.
 
 use super::byte_reader::{Result, error_at};
-use crate::mesh::{Side, twice_area};
+use crate::mesh::{Side, extent, place, twice_area};
 
 /// Checks that the triangles are one body: connected through their `sides`.
 pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Result<()> {
@@ -18,6 +18,7 @@ pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Re
     let meeting: Vec<(usize, [usize; 2])> = meeting.collect();
     let piece = components(triangles.len(), meeting.iter().map(|(_, pair)| *pair));
     let pieces: Vec<usize> = (0..triangles.len()).filter(|&t| piece[t] == t).collect();
+    let place = |at: [f64; 2]| place(extent(nodes), at);
     let around = |own: usize| place(centroid(nodes, triangles, |t| piece[t] == own));
     let problem = if let [a, b, more @ ..] = &pieces[..] {
         let (count, two) = (pieces.len(), if more.is_empty() { "" } else { " two of them" });
@@ -64,10 +65,4 @@ fn centroid(
         sums = [sums[0] + area, sums[1] + x, sums[2] + y];
     }
     [sums[1] / sums[0], sums[2] / sums[0]]
-}
-
-/// Coordinates with six digits, and 0 instead of -0.
-fn place(x: [f64; 2]) -> String {
-    let [x, y] = x.map(|v| format!("{v:.5e}").parse::<f64>().unwrap_or(v) + 0.0);
-    format!("({x}, {y})")
 }

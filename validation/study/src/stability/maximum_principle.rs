@@ -8,7 +8,8 @@ use super::{
 use crate::StudyError;
 use signorini::{
     contact::SOLVERS,
-    evolution::{self, DiscreteProblem, Phases, Step},
+    estimate,
+    evolution::{DiscreteProblem, Phases, Step},
     fem,
     mesh::Mesh,
     petsc::Session,
@@ -91,7 +92,7 @@ fn add(
     let problem = problem(case, diffusion, step, mass)?;
     let mut history = Vec::new();
     let outcome =
-        evolution::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |accepted| {
+        estimate::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |accepted| {
             history.push(accepted.clone());
             Ok(())
         })?;
