@@ -29,7 +29,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook \
-    fuzz clean
+    constants fuzz clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -52,6 +52,7 @@ help:
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
 	@echo 'make handbook   published and closed answers, with bars and with --accuracy (minutes); or ARGS="hertz_plane"'
+	@echo 'make constants  the register of tuned constants, validation/CONSTANTS.md, from their comments'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
 	@echo 'make clean      remove the build, the results and the meshes'
 
@@ -139,6 +140,9 @@ accuracy: build
 # Truths are kept in out/promises/truth.
 promises: build
 	$(PYTHON) validation/promises.py --binary $(BINARY) $(ARGS)
+
+constants:
+	@$(PYTHON) validation/constants.py > $@.md && mv $@.md validation/CONSTANTS.md
 
 handbook: build
 	$(PYTHON) validation/handbook.py --binary $(BINARY) $(ARGS)

@@ -19,11 +19,19 @@ CONSTANT = re.compile(r"((?:^ *///.*\n)*)^ *(?:pub(?:\([a-z:]+\))? )?(?:const|st
 TUNED = re.compile(r"Tuned on (?P<scenes>.+?)\. (?P<lower>\S+?): (?P<less>.+?)\. (?P<upper>\S+?): (?P<more>.+?)\.$")
 HEAD = """# Constants that were tuned
 
-This page is made by `make constants` from the comments in `src`; a test compares both. Each constant was halved and doubled
-(or set to the value that is named), and the scenes were run again. All other constants follow from theory, from the rounding
-of numbers or from a file format, or they only choose when a message appears; their comments say so.
+`make constants` makes this page from the comments in `src`, and a test compares both. Every constant was halved and doubled
+(or set to the value that is named), and the scenes were run again. The other constants in `src` follow from theory, from
+rounding or from a file format, or only choose when a note appears; their comments say which.
 
-To tune a constant: change it in `src`, run the scenes, enter the effects in its comment, and run `make constants`.
+| scenes | runs |
+|---|---|
+| the 13 adapted runs | all nine scenes of `geo` with `--accuracy 0.1`; `beam`, `bridge-half`, `lshape-rolling`, `square-table1` with 0.03 |
+| the 6 plain runs | `bridge`, `hertz`, `lshape`, `lshape-rolling`, `square`, `square-table1` as they are |
+| the 4 penalty-duality runs | `bridge`, `hertz`, `lshape`, `square-table1` with `--solver penalty-duality` |
+| the handbook | `make handbook` |
+
+Numbers are sums over the runs, of triangles, time steps or iterations. To tune a constant, change it in `src`, run its scenes,
+enter the effects in its comment, and run `make constants`.
 
 | constant | value | meaning | tuned on | less | more |
 |---|---|---|---|---|---|"""
@@ -52,7 +60,7 @@ def main():
             sys.exit(f'{file}: {name}: expected "Tuned on SCENES. Half: EFFECT. Twice: EFFECT."')
         cells = [f"`{name}`<br>[{file}](../src/{file})", value, meaning, effect["scenes"],
                  f"{effect['lower']}: {effect['less']}", f"{effect['upper']}: {effect['more']}"]
-        print("| " + " | ".join(cell.replace("\n", " ").replace("|", "\\|") for cell in cells) + " |")
+        print("| " + " | ".join(cell.replace("\n", " ").replace("|", "\\|").replace("[`", "`").replace("`]", "`") for cell in cells) + " |")
 
 
 if __name__ == "__main__":

@@ -125,6 +125,8 @@ impl AdaptError {
 }
 
 /// The tolerance of the time steps of the runs with few steps.
+///
+/// Tuned on the 13 adapted runs. Half: 1 % more triangles. Twice: 2 % fewer, a quarter fewer for `square`.
 const FEW_STEP_TOLERANCE: f64 = 0.05;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 25;

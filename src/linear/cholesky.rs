@@ -34,6 +34,8 @@ pub enum Precision {
 
 /// The largest residual ‖b − A x‖₂/‖b‖₂ of a solve for which the factor stays in single precision. Up to this
 /// residual the iterations are hardly more than in double precision, and each takes half the time.
+///
+/// Tuned on the 6 plain runs. Half: nothing changes. Twice: nothing changes.
 const LARGEST_RESIDUAL: f64 = 0.3;
 
 /// The cost of a factorisation in bytes that a solve reads in the same time: per floating-point operation,

@@ -29,7 +29,10 @@ pub struct Reduction {
     pub reached: f64,
 }
 
-/// A solve with an old factor may take at least this number of extra iterations.
+/// A solve with an old factor may take at least this number of iterations more than with a new one.
+///
+/// Tuned on the 6 plain runs. Half: nothing changes but for `square`, which takes 239 pairs of triangular solves for
+/// 235. Twice: nothing changes.
 const EXTRA_ITERATIONS: usize = 3;
 
 impl RefactorisationPolicy {

@@ -7,6 +7,7 @@ mod test_directory;
 mod tutorial;
 mod check;
 mod compare;
+mod constants;
 mod extremes;
 mod failing;
 mod fields;

@@ -19,15 +19,19 @@ pub struct Anderson {
     comm: Communicator,
 }
 
-/// The number of mixed iterates. Half of them take three times as many iterations; twice save a third.
+/// The number of mixed iterates.
+///
+/// Tuned on the 4 penalty-duality runs. Half: 57 % more iterations. Twice: 12 % fewer.
 const DEPTH: usize = 10;
+/// A residual above this multiple of the smallest one so far drops the history.
 const OVERSHOOT: f64 = 10.0;
 /// Differences of iterates smaller than this, relative to the largest, are rounding.
 const SAME_ITERATE: f64 = 1e-10;
 
-/// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far.
-/// Beyond this multiple of a difference the method takes the plain step. Half and twice change nothing; without a limit
-/// some bodies have no answer.
+/// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far. If a
+/// coefficient of the mixing is larger than this, the method takes the plain step.
+///
+/// Tuned on the 4 penalty-duality runs. Half: the same iterations. Infinity: some free bodies have no answer.
 const FARTHEST: f64 = 1e6;
 
 impl Anderson {

@@ -32,22 +32,32 @@ pub(super) struct ErrorControl<'a> {
     damage: [f64; 2],
 }
 
-/// The longest step, as a fraction of the run. Half of it takes a quarter more steps; with twice a bar
-/// of six bodies fails.
+/// The longest step, as a fraction of the run.
+///
+/// Tuned on the 13 adapted runs. Half: 43 % more steps. Twice: 13 % fewer, and a bar of six other bodies fails.
 const LONGEST_STEP: f64 = 0.05;
-/// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run.
-/// Shorter steps would not follow a jump either.
+/// A step within which the loads are not nearly linear in time is halved, down to this fraction of the run. Shorter
+/// steps would not follow a jump either.
+///
+/// Tuned on the 13 adapted runs. Half: nothing changes. Twice: nothing changes.
 const FOLLOWING: f64 = 1.0 / 2000.0;
 /// Maximum damage in a forecast. The damage of a failing body accelerates, and early errors grow with it.
+///
+/// Tuned on the 13 adapted runs. Half: `square` takes 21 steps for 20. Twice: `square` takes 19 steps.
 const MAX_FORECAST: f64 = 0.1;
-/// Meshes and time steps aim at this fraction of the allowed error: a mesh may miss its aim, and the error of a step grows
-/// in later steps. With half of it meshes have about twice as many triangles; with twice,
-/// accuracies are missed.
+/// Meshes and time steps aim at this fraction of the allowed error: a mesh may miss its aim, and the error of a step
+/// grows in later steps.
+///
+/// Tuned on the 13 adapted runs. Half: a third more triangles, 22 % more steps. Twice: 11 runs miss their accuracy.
 pub const AIM: f64 = 0.7;
-/// One step may add this fraction of the remaining error. Half of it takes up to a third more steps; twice, up to a fifth
-/// fewer …
+/// The error of one step may be this fraction of the error that the steps before have left.
+///
+/// Tuned on the 13 adapted runs. Half: 19 % more steps. Twice: 9 % fewer.
 const STEP_SHARE: f64 = 0.25;
-/// … which is at least this fraction of the aim. Earlier steps may have used it up.
+/// The error that the steps before have left counts as at least this fraction of the aim: they may have used it up.
+///
+/// Tuned on the 13 adapted runs. Half: `square` takes 22 steps for 20. Twice: `square` takes 18 steps and a fifth
+/// more triangles.
 const MIN_REST: f64 = 1.0 / 16.0;
 
 impl<'a> ErrorControl<'a> {

@@ -10,6 +10,8 @@ pub(super) struct Forecast {
 }
 
 /// The number of evenly spread times at which loads are sampled, besides the times at which they are not smooth.
+///
+/// Tuned on the 13 adapted runs. Half: nothing changes. Twice: nothing changes.
 const FORECAST_TIMES: usize = 200;
 /// Minimum s² in a forecast: smaller loads say little about the damage by larger ones.
 const SMALL: f64 = 0.01;

@@ -7,7 +7,8 @@ use crate::{
 };
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
-/// On 12 scenes, with half of it meshes have an eighth more triangles; twice changes little.
+///
+/// Tuned on the 13 adapted runs. Half: 5 % more steps, 28 % more for `beam`. Twice: nothing changes.
 const NONLINEARITY: f64 = 0.05;
 /// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;

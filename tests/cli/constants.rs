@@ -1,0 +1,15 @@
+//! The register of tuned constants is what the comments in the code say, and each constant has a name of its own.
+
+use std::{env, fs, path::Path, process::Command};
+
+#[test]
+fn the_register_of_tuned_constants_is_made_of_their_comments_and_each_name_means_one_thing() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let python = env::var("PYTHON").unwrap_or("python3".to_owned());
+    let made = Command::new(python).arg("validation/constants.py").current_dir(root).output();
+    let made = made.expect("Python");
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let page = fs::read_to_string(root.join("validation/CONSTANTS.md")).expect("it is there");
+    assert!(String::from_utf8_lossy(&made.stdout) == page, "out of date: make constants");
+    assert!(page.matches("\n| `").count() > 25, "the register is nearly empty");
+}
