@@ -1,7 +1,7 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
 use crate::{
-    fem::{Body, Elasticity, Fit, Patches, for_elements, monomials},
+    fem::{Body, Elasticity, Fit, Patches, monomials},
     petsc::PetscError,
 };
 use nalgebra::{Matrix6, Matrix6x3, Vector3};
@@ -42,8 +42,7 @@ impl<'a> RecoveredStrains<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
-        let strains = for_elements!(body, cells => cells.strains(u, |_, strain| strain));
-        Self::on(&Patches::new(body), body, strains)
+        Self::on(&Patches::new(body), body, body.strains(u))
     }
 
     /// Recovers the `strains` at the quadrature points of `body`. Collective.

@@ -79,8 +79,7 @@ impl DamageStep<'_> {
             return DamageSource { load: DVector::zeros(state.zeta.len()), min: 0.0 };
         };
         self.phases.time("damage source", || {
-            let strain = problem.elasticity.strain_squared(body, &state.u);
-            let phi = fem::source(body, laws, &strain, &state.zeta);
+            let phi = fem::source(body, laws, &body.strains(&state.u), &state.zeta);
             let min = phi.iter().flatten().copied().fold(0.0, f64::min);
             let min = body.vertices.partition.comm().min(min);
             let load = fem::source_load(body, problem.mass(), &phi);

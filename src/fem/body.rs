@@ -3,8 +3,10 @@
 use super::{
     Cells, Edge, Elements, Partition, Triangle,
     element::{POINTS, Quadratic, quadratic_values},
+    for_elements,
 };
 use crate::mesh::{Mesh, Order, sorted};
+use nalgebra::Vector3;
 use rustc_hash::FxHashMap as HashMap;
 use std::rc::Rc;
 
@@ -141,6 +143,11 @@ impl Body {
         let mut weights = known.iter().zip(&self.nodes.weights).take(self.nodes.partition.owned());
         let least = 1e-9 * self.area / self.nodes.partition.total() as f64;
         weights.all(|(known, weight)| (known - weight).abs() <= (1e-9 * weight).max(1e-3 * least))
+    }
+
+    /// The strains (ε_xx, ε_yy, 2ε_xy) of nodal u at the quadrature points of the elements, Q in turn for each triangle.
+    pub fn strains(&self, u: &[f64]) -> Vec<Vector3<f64>> {
+        for_elements!(self, cells => cells.strains(u, |_, strain| strain))
     }
 
     /// A nodal field of ζ at the quadrature points of the elements of u, Q in turn for each triangle.

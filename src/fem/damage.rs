@@ -34,22 +34,21 @@ impl Mass {
 }
 
 /// The damage source φ of (25) at three points of each triangle, 1/s: for P1 displacements at the
-/// vertices, from nodal ζ and the triangle's |ε|²; for P2 at the quadrature points, from ζ and |ε|²
-/// there. `strain_squared` is that of [`Elasticity::strain_squared`](super::Elasticity), `laws` are those
-/// of the materials by their numbers.
+/// vertices, from nodal ζ and the triangle's strain; for P2 at the quadrature points, from ζ and the strain
+/// there. `strains` are those of [`Body::strains`], `laws` those of the materials by their numbers.
 pub fn source(
     body: &Body,
     laws: &[DamageLaw],
-    strain_squared: &[f64],
+    strains: &[Vector3<f64>],
     zeta: &[f64],
 ) -> Vec<[f64; 3]> {
     let of_triangle = |(t, nodes): (usize, &[usize; 3])| {
         let (law, vertices) = (&laws[body.material(t)], nodes.map(|node| zeta[node]));
-        let (e2, zeta) = match body.order() {
-            Order::Linear => ([strain_squared[t]; 3], vertices),
-            Order::Quadratic => (strain_squared.as_chunks().0[t], at_quadratic_points(vertices)),
+        let (strains, zeta) = match body.order() {
+            Order::Linear => ([strains[t]; 3], vertices),
+            Order::Quadratic => (strains.as_chunks().0[t], at_quadratic_points(vertices)),
         };
-        [0, 1, 2].map(|q| law.source(e2[q], zeta[q]))
+        [0, 1, 2].map(|q| law.source(&strains[q], zeta[q]))
     };
     body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
 }

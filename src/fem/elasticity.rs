@@ -34,12 +34,6 @@ impl Elasticity {
         &self.materials[body.material(t)].1
     }
 
-    /// |ε|² = Σ ε_ij² (the shear counts twice) of nodal u at the quadrature points of the elements.
-    pub fn strain_squared(&self, body: &Body, u: &[f64]) -> Vec<f64> {
-        let squared = |_, e: Vector3<f64>| e[0] * e[0] + e[1] * e[1] + 0.5 * e[2] * e[2];
-        for_elements!(body, cells => cells.strains(u, squared))
-    }
-
     /// σ = ζ Aε(u), Pa, the mean Σ w_q σ_q / Σ w_q over each triangle, with `zeta` the values of ζ at the
     /// quadrature points q.
     pub fn stresses(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<Vector3<f64>> {

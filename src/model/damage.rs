@@ -1,5 +1,6 @@
 //! The damage source φ of the paper's section 4 with its truncations q* and η_*.
 
+use nalgebra::Vector3;
 use serde::Deserialize;
 
 /// Frémond's damage law: the source φ and the constants of equation (3).
@@ -21,10 +22,11 @@ pub struct DamageLaw {
 
 impl DamageLaw {
     /// The source φ(ε, ζ) = −(λ_D (1−ζ)/ζ + ½ λ_U Ψ_q*(ε) − λ_W)₊ ≤ 0, 1/s,
-    /// from |ε|² = Σ ε_ij² and ζ; ζ is truncated by η_* as in equation (3).
-    pub fn source(&self, strain_squared: f64, zeta: f64) -> f64 {
-        let zeta = self.truncate(zeta);
-        let psi = strain_squared.min(self.strain_cap);
+    /// from the strain (ε_xx, ε_yy, 2ε_xy) and ζ, with |ε|² = Σ ε_ij²; ζ is truncated by η_* as in equation (3).
+    #[inline]
+    pub fn source(&self, strain: &Vector3<f64>, zeta: f64) -> f64 {
+        let (zeta, [xx, yy, twice_xy]) = (self.truncate(zeta), strain.as_ref());
+        let psi = (xx * xx + yy * yy + 0.5 * twice_xy * twice_xy).min(self.strain_cap);
         let rate = self.lambda_d * (1.0 - zeta) / zeta + 0.5 * self.lambda_u * psi - self.lambda_w;
         -rate.max(0.0)
     }

@@ -1,6 +1,6 @@
 //! The paper's laws at one point of the body: plane elasticity ([`Material`]) and the damage source
-//! ([`DamageLaw`]). Numbers come in and go out; nothing here knows meshes or time. A new law is a change here, in
-//! `geo/scene.schema.json` and in KEYS.
+//! ([`DamageLaw`]). Numbers come in and go out; nothing here knows meshes or time. A new law is a change here and in
+//! `geo/scene.schema.json`, from which KEYS is made.
 
 mod damage;
 mod elasticity;

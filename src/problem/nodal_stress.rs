@@ -3,7 +3,7 @@
 use super::{DiscreteProblem, State, Value, figures::greatest};
 use crate::{
     ROUNDING,
-    fem::{Elements, Fit, Partition, Patches, RigidMotion, for_elements, monomials},
+    fem::{Elements, Fit, Partition, Patches, RigidMotion, monomials},
     model::{Material, von_mises},
     petsc::PetscError,
 };
@@ -91,8 +91,7 @@ impl NodalStress {
     /// What the stresses of `state` are made from.
     pub fn strained(problem: &DiscreteProblem, state: &State) -> Strained {
         let body = &problem.body;
-        let strains = for_elements!(body, cells => cells.strains(&state.u, |_, strain| strain));
-        let zeta = body.at_nodes(&state.zeta, 1);
+        let (strains, zeta) = (body.strains(&state.u), body.at_nodes(&state.zeta, 1));
         Strained { strains, zeta: zeta.into_iter().map(|zeta| problem.truncated(zeta)).collect() }
     }
 

@@ -57,8 +57,8 @@ fn the_loss_of_damage_in_a_run_is_the_integral_of_the_source() {
         let (body, laws) = (&scene.body, scene.damage().unwrap());
         for pair in steps.windows(2) {
             let state = &pair[0].state;
-            let strain = scene.elasticity.strain_squared(body, &state.u);
-            let load = source_load(body, scene.mass(), &source(body, laws, &strain, &state.zeta));
+            let phi = source(body, laws, &body.strains(&state.u), &state.zeta);
+            let load = source_load(body, scene.mass(), &phi);
             let added = 0.1 * load.iter().sum::<f64>() / body.area;
             let change = pair[1].record.zeta_mean - pair[0].record.zeta_mean;
             assert!(added < -1e-4 && (change - added).abs() < 1e-13, "{set}: {change} {added}");

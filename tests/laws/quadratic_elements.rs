@@ -4,7 +4,8 @@
 use crate::{
     elements::{check_stiffness, material},
     support::{
-        DAMAGE_LAW, Random, bent, close, curved, difference, distorted, square, unstructured,
+        DAMAGE_LAW, Random, bent, close, curved, difference, distorted, random_strains, square,
+        unstructured,
     },
 };
 use nalgebra::{Matrix2, Vector3};
@@ -171,13 +172,13 @@ fn the_damage_source_is_taken_at_the_quadrature_points() {
     let law = DAMAGE_LAW;
     let mut random = Random::new(15);
     let zeta: Vec<f64> = body.mesh.nodes.iter().map(|_| 0.6 + 0.3 * random.next()).collect();
-    let strain: Vec<f64> = (0..3 * body.triangles.len()).map(|_| random.next().abs()).collect();
+    let (strains, squares) = random_strains(&mut random, 3 * body.triangles.len());
     let mut expected = vec![0.0; zeta.len()];
     for (t, nodes) in body.mesh.triangles.iter().enumerate() {
         for (q, l) in POINTS.iter().enumerate() {
             let z: f64 = nodes.iter().zip(l).map(|(&node, l)| l * zeta[node]).sum();
             let rate =
-                law.lambda_d * (1.0 - z) / z + 0.5 * law.lambda_u * strain[3 * t + q].min(0.8);
+                law.lambda_d * (1.0 - z) / z + 0.5 * law.lambda_u * squares[3 * t + q].min(0.8);
             let phi = -(rate - 0.1).max(0.0);
             for (&node, l) in nodes.iter().zip(l) {
                 expected[node] += body.triangles[t].area() / 3.0 * phi * l;
@@ -185,7 +186,7 @@ fn the_damage_source_is_taken_at_the_quadrature_points() {
         }
     }
     for mass in [Mass::Consistent, Mass::Lumped] {
-        let load = source_load(&body, mass, &source(&body, &[law], &strain, &zeta));
+        let load = source_load(&body, mass, &source(&body, &[law], &strains, &zeta));
         let error = difference(&load, &expected);
         assert!(error < 1e-14, "{error}");
     }

@@ -5,6 +5,7 @@ mod common;
 
 pub use common::{Random, curved_area, square};
 
+use nalgebra::{Matrix2, Vector3};
 use signorini::{
     contact::SOLVERS,
     estimate::{self, Adapted},
@@ -17,7 +18,7 @@ use signorini::{
 use std::{collections::BTreeMap, fs, path::Path};
 use tempfile::TempDir;
 
-/// A damage law of which every constant counts.
+/// A damage law of which every constant counts. Tests change some of its constants.
 pub const DAMAGE_LAW: DamageLaw = DamageLaw {
     diffusion: 0.7,
     lambda_d: 0.3,
@@ -26,6 +27,16 @@ pub const DAMAGE_LAW: DamageLaw = DamageLaw {
     strain_cap: 0.8,
     threshold: 0.01,
 };
+
+/// Random strains (ε_xx, ε_yy, 2ε_xy), and |ε|² = Σ ε_ij² of each.
+pub fn random_strains(random: &mut Random, count: usize) -> (Vec<Vector3<f64>>, Vec<f64>) {
+    let strains: Vec<Vector3<f64>> =
+        (0..count).map(|_| Vector3::from_fn(|_, _| random.next())).collect();
+    let squared =
+        |e: &Vector3<f64>| Matrix2::new(e[0], e[2] / 2.0, e[2] / 2.0, e[1]).norm_squared();
+    let squares = strains.iter().map(squared).collect();
+    (strains, squares)
+}
 
 /// The [`square`] with its inner nodes moved at random, by up to 0.3 cells in x and y, and those on
 /// the sides along them.

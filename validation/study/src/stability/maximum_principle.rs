@@ -181,7 +181,7 @@ impl Seen {
 /// min φ at a state, 1/s.
 fn least_source(problem: &DiscreteProblem, step: &Step) -> f64 {
     let Some(laws) = problem.damage() else { return 0.0 };
-    let strain = problem.elasticity.strain_squared(&problem.body, &step.state.u);
-    let phi = fem::source(&problem.body, laws, &strain, &step.state.zeta);
+    let strains = problem.body.strains(&step.state.u);
+    let phi = fem::source(&problem.body, laws, &strains, &step.state.zeta);
     phi.iter().flatten().copied().fold(0.0, f64::min)
 }
