@@ -18,7 +18,7 @@ def draw_curves(arguments, styled):
     """Draws a figure for each quantity into the folder of the first run, and writes the numbers of all curves; yields
     the paths."""
     runs = [open_run(folder) for folder in arguments.folders]
-    where = f"along_{arguments.along}" if arguments.along else "line"
+    where = f"along_{arguments.along}".replace("/", "_") if arguments.along else "line"
     folder = runs[0].folder
     for quantity in arguments.quantity or ["von_mises"]:
         rows, figure = [], plt.figure(figsize=(wide(6.0), max(2.8, 0.63 * wide(6.0))))

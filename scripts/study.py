@@ -25,12 +25,13 @@ import subprocess
 import sys
 import time
 import zlib
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from signorini_summaries import COLUMNS, named, rows_of, summary_of
-from table import printed, refused, write_table
+from signorini_summaries import COLUMNS, rows_of, summary_of
+from table import names_of, printed, refused, write_table
 
 # The longest name of a folder.
 LONGEST = 120
@@ -54,7 +55,10 @@ def values_of(text):
             part = ""
         else:
             part += letter
-    return key.strip(), [part.strip() for part in [*found, part]]
+    found = [part.strip() for part in [*found, part]]
+    if again := next((value for n, value in enumerate(found) if value in found[:n]), None):
+        raise argparse.ArgumentTypeError(f"{key.strip()} has the value {again} twice; remove one")
+    return key.strip(), found
 
 
 def cases_of(path):
@@ -63,11 +67,15 @@ def cases_of(path):
         raise argparse.ArgumentTypeError(f"{path}: {problem}")
 
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
-    except (OSError, ValueError) as error:
-        refuse(getattr(error, "strerror", None) or error)
+        text = Path(path).read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        refuse(error.strerror)
+    except ValueError:
+        text = "\0"
+    if "\0" in text:
+        refuse("is not in UTF-8; save the file in this encoding")
+    reader = csv.reader(text.splitlines())
+    lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
     if len(lines) < 2:
         refuse("needs a head with keys, and a row for each run")
     (first, head), *rows = lines
@@ -77,14 +85,25 @@ def cases_of(path):
         if len(row) != len(head):
             refuse(f"line {line} has {len(row)} cells and the head {len(head)}; leave cells empty between commas, and put "
                    "values with commas in quotes")
-    return head, [[(key, value) for key, value in zip(head, row) if value] for _, row in rows]
+    cases = {}
+    for line, row in rows:
+        case = tuple((key, value) for key, value in zip(head, row) if value)
+        if case in cases:
+            refuse(f"lines {cases[case]} and {line} are the same run; remove one of them")
+        cases[case] = line
+    return head, list(map(list, cases))
 
 
-def name_of(chosen):
-    """The name of a run's folder from its values. A name that would be too long ends with a checksum."""
-    parts = [f"{key.rpartition('.')[2]}={value}" for key, value in chosen]
-    name = re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__")) or "run"
-    return name if len(name) <= LONGEST else f"{name[:LONGEST - 9]}-{zlib.crc32(str(chosen).encode()):08x}"
+def names_for(runs):
+    """The names of the runs' folders from their values. Names that would be too long or equal end with a checksum."""
+    def plain(chosen):
+        parts = [f"{key.rpartition('.')[2]}={value}" for key, value in chosen]
+        return re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__")) or "run"
+
+    counts = Counter(map(plain, runs))
+    return [name if len(name) <= LONGEST and counts[name] == 1
+            else f"{name[:LONGEST - 9]}-{zlib.crc32(str(chosen).encode()):08x}"
+            for chosen, name in zip(runs, map(plain, runs))]
 
 
 def inputs_of(scene):
@@ -204,7 +223,7 @@ def main(prog=None):
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help=(
         "runs at once (default: the cores that this process may use)"))
     parser.add_argument("--frames", action="store_true", help="with frames, as `run` writes them")
-    parser.add_argument("--columns", type=lambda text: named(text.split(",")), default=COLUMNS, metavar=(
+    parser.add_argument("--columns", type=names_of, default=COLUMNS, metavar=(
         "NAME,…"), help="of the table, as for `signorini table`")
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
@@ -219,11 +238,7 @@ def main(prog=None):
     out = arguments.out or Path("out") / f"{Path(arguments.scene).stem}-study"
     products = [list(zip(keys, values)) for values in itertools.product(*(values for _, values in arguments.set))]
     chosen = [case + product for case in cases for product in products]
-    folders = [out / name_of(of) for of in chosen]
-    if len(set(folders)) < len(folders):
-        print("error: two runs would have the same folder: a value is given twice, or values differ only in "
-              "signs that are not letters or digits", file=sys.stderr)
-        return 2
+    folders = [out / name for name in names_for(chosen)]
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
     failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs)
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]

@@ -19,6 +19,11 @@ def text_of(value):
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def names_of(text):
+    """The names in a list with commas, as in CSV: a name with a comma stands in double quotes."""
+    return named(next(csv.reader([text], skipinitialspace=True), []))
+
+
 def write_rows(rows, file, units=None):
     """Writes dictionaries as CSV with a column per key in the order of appearance; the head has the units."""
     names = list(dict.fromkeys(key for row in rows for key in row))
@@ -34,7 +39,8 @@ def titles(names, units):
 
 def write_table(rows, path, units=None):
     """Writes dictionaries as a CSV file."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
+    # Names of folders may be any bytes.
+    with open(path, "w", newline="", encoding="utf-8", errors="surrogateescape") as file:
         write_rows(rows, file, units)
 
 
@@ -70,8 +76,9 @@ def main(prog=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="folders of results")
-    parser.add_argument("--columns", type=lambda text: named(text.split(",")), default=COLUMNS, metavar=(
-        "NAME,…"), help="figures, also NAME.governing and NAME.governing.time of the whole run, and entries of summary.json: errors.solver")
+    parser.add_argument("--columns", type=names_of, default=COLUMNS, metavar="NAME,…", help=(
+        "figures, also NAME.governing and NAME.governing.time of the whole run, and entries of summary.json: errors.solver; "
+        "a name with a comma stands in double quotes"))
     parser.add_argument("--csv", action="store_true", help="as CSV with all digits; error bars are columns NAME.bar")
     arguments = parser.parse_args()
     found, failed = {}, False

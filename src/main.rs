@@ -68,6 +68,9 @@ enum Command {
         /// Scene files.
         #[arg(required = true, value_name = "SCENE")]
         scenes: Vec<PathBuf>,
+        /// Override a key of each scene, e.g. --set mesh.size=0.1; may be repeated.
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
     },
 }
 
@@ -88,7 +91,7 @@ fn main() -> ExitCode {
         Command::Solvers => command::solvers(),
         Command::Keys { schema, figures } => command::keys(schema, figures),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),
-        Command::Mesh { scenes } => command::mesh(&scenes),
+        Command::Mesh { scenes, set } => command::mesh(&scenes, &set),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

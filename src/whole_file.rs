@@ -1,4 +1,4 @@
-//! Files that appear complete or not at all.
+//! Whole files: text in UTF-8, and files that appear complete or not at all.
 
 use std::{
     fs::{File, Permissions},
@@ -6,6 +6,22 @@ use std::{
     os::unix::fs::PermissionsExt,
     path::Path,
 };
+
+/// The text of a file.
+///
+/// # Errors
+/// The file is not in UTF-8.
+pub(crate) fn text(bytes: Vec<u8>) -> Result<String, String> {
+    // No text in UTF-8 has a zero; every text in UTF-16 with Latin letters has one.
+    if bytes.contains(&0) {
+        return Err("is in UTF-16 or no text; save the file in UTF-8".to_owned());
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        format!("line {line} is not in UTF-8; save the file in this encoding")
+    })
+}
 
 /// The names of incomplete files begin with this.
 pub(crate) const PARTIAL: &str = ".partial-";

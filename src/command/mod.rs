@@ -37,7 +37,7 @@ use signorini::{
     scene::{Boundary, Condition, MeshSource, SCHEMA, Scene, Units},
 };
 use std::{
-    collections::{BTreeSet, HashSet},
+    collections::HashSet,
     fmt,
     io::{self, Write},
     path::PathBuf,
@@ -101,6 +101,16 @@ fn fraction(text: &str) -> Result<f64, &'static str> {
     text.parse().map_err(|_| "write a number with a decimal point: 0.01 is 1 %")
 }
 
+/// The names in a list with commas, as in CSV: a name with a comma stands in double quotes.
+fn split_names(list: &str) -> Vec<String> {
+    let reader = csv::ReaderBuilder::new().has_headers(false).from_reader(list.as_bytes());
+    reader
+        .into_records()
+        .flatten()
+        .flat_map(|names| Vec::from_iter(names.iter().map(str::to_owned)))
+        .collect()
+}
+
 /// A scene and overrides of its keys.
 #[derive(Args)]
 pub struct SceneArguments {
@@ -115,8 +125,8 @@ pub struct SceneArguments {
     #[arg(long, value_name = "ERROR", value_parser = fraction)]
     accuracy: Option<f64>,
     /// Ask for the accuracy of this figure alone (work, displacement_max, contact_force, zeta_min, zeta_mean,
-    /// NAME.force_x … as in summary.json), or of several, with commas.
-    #[arg(long, value_delimiter = ',', value_name = "NAME")]
+    /// NAME.force_x … as in summary.json), or of several, with commas; a name with a comma stands in quotes.
+    #[arg(long, value_name = "NAME")]
     accuracy_of: Vec<String>,
     /// Begin no finer mesh for the accuracy that would need more memory on all ranks [default: half of the free
     /// memory at the start].
@@ -150,11 +160,7 @@ impl SceneArguments {
                 file.display()
             )));
         }
-        let mut keys = BTreeSet::new();
-        match self.set.iter().find(|set| !keys.insert(key_of(set))) {
-            Some(again) => Err(Failure::input(format!("--set {again}: its key is given twice"))),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// The scene with its overrides and those in `more`, and notes for the user.
@@ -162,8 +168,10 @@ impl SceneArguments {
         let keys = ["accuracy", "max_memory", "max_seconds"];
         let values = [self.accuracy, self.max_memory, self.max_seconds].into_iter().zip(keys);
         let asked = values.filter_map(|(value, key)| Some(format!("{key}={}", value?)));
-        let quoted: Vec<_> = self.accuracy_of.iter().map(|name| format!("'{name}'")).collect();
-        let figures = (!quoted.is_empty()).then(|| format!("accuracy_of=[{}]", quoted.join(",")));
+        let figures = self.accuracy_of.iter().flat_map(|names| split_names(names));
+        let figures = Vec::from_iter(figures.map(toml::Value::from));
+        let figures =
+            (!figures.is_empty()).then(|| format!("accuracy_of={}", toml::Value::from(figures)));
         let asked = Vec::from_iter(asked.chain(figures));
         let set = [&self.set[..], &asked, more].concat();
         let mut scene = Scene::read(&self.scene, &set).map_err(Failure::input)?;
@@ -312,10 +320,10 @@ pub fn completions(shell: clap_complete::Shell, mut program: clap::Command) -> R
 }
 
 /// `signorini mesh SCENE…`.
-pub fn mesh(scenes: &[PathBuf]) -> Result<(), Failure> {
+pub fn mesh(scenes: &[PathBuf], set: &[String]) -> Result<(), Failure> {
     require_one_process()?;
     for path in scenes {
-        let scene = Scene::read(path, &[]).map_err(Failure::input)?;
+        let scene = Scene::read(path, set).map_err(Failure::input)?;
         let mesh = read_mesh(&scene, false)?;
         mesh.notes.iter().for_each(|note| tell("note", note));
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());

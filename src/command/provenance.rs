@@ -17,7 +17,7 @@ pub fn provenance(gmsh: Option<&str>) -> Value {
         "command": arguments.collect::<Vec<_>>(),
         "libraries": libraries(),
         "gmsh": gmsh,
-        "directory": env::current_dir().ok(),
+        "directory": env::current_dir().ok().map(|path| path.to_string_lossy().into_owned()),
         "machine": {
             "host": fs::read_to_string("/proc/sys/kernel/hostname").ok().map(|n| n.trim().to_owned()),
             "processor": processor(),

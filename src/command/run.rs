@@ -74,7 +74,8 @@ impl RunArguments {
 
     /// The scene with its overrides, and notes for the user.
     fn read(&self) -> Result<(Scene, Vec<String>), Failure> {
-        let solver = self.solver.iter().map(|name| format!("contact.solver='{name}'"));
+        let solver =
+            self.solver.iter().map(|name| format!("contact.solver={}", toml::Value::from(&**name)));
         self.scene.read(&Vec::from_iter(solver))
     }
 

@@ -39,8 +39,8 @@ pub fn open(task: &Task) -> Progress {
     lines.extend(scene.time.map(|grid| row("time", steps(grid))));
     say(&lines.join("\n"));
 
-    let mut progress = Progress::new("{bar:20} {wide_msg} {elapsed}, {eta} left", LENGTH);
-    progress.show(0, "the first solve".to_owned());
+    let mut progress = Progress::new(LENGTH);
+    progress.show(0, vec!["the first solve".to_owned()]);
     progress
 }
 
@@ -79,15 +79,14 @@ pub fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
 
 /// Shows an accepted step of a run to t = `end`.
 pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
-    let message = format!(
-        "step {}  t = {}  min ζ = {:.6}  active {}  iterations {}",
-        record.step,
-        plain(record.time, 5),
-        record.zeta_min,
-        record.active_nodes,
-        record.iterations
-    );
-    bar.show((LENGTH as f64 * record.time / end) as u64, message);
+    let fields = vec![
+        format!("t = {}", plain(record.time, 5)),
+        format!("step {}", record.step),
+        format!("min ζ = {:.6}", record.zeta_min),
+        format!("active {}", record.active_nodes),
+        format!("iterations {}", record.iterations),
+    ];
+    bar.show((LENGTH as f64 * record.time / end) as u64, fields);
 }
 
 /// The closing lines of a run: its end, and the figures of its last accepted state. `last` is `None` if the first solve failed.

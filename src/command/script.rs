@@ -52,8 +52,8 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
         .args(arguments)
         // `compare` runs this program.
         .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
-        // The sources and their output are UTF-8.
-        .env("PYTHONIOENCODING", "utf-8")
+        // The sources and their output are UTF-8, except paths, which may be any bytes.
+        .env("PYTHONIOENCODING", "utf-8:surrogateescape")
         .stdin(sources)
         .exec();
     Err(Failure::from(format!("{}: {error}", python.display())))

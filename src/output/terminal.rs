@@ -15,7 +15,7 @@ pub fn say(text: &str) {
 }
 
 /// The smallest error bar that is shown, over its figure.
-const LEAST_BAR: f64 = 1e-6;
+const SMALLEST_BAR: f64 = 1e-6;
 
 /// A figure with its error bar, if it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-2`. The bar is rounded up to
 /// one digit, or to two if the first one is 1 or 2. The figure has at most seven digits. `scripts/bars.py` does the
@@ -28,7 +28,7 @@ pub fn with_bar(value: f64, bar: Option<f64>) -> String {
         return format!("{value:.1e} ± {bar:.1e}");
     }
     let of_both = exponent(value.abs().max(bar));
-    let bar = bar.max(LEAST_BAR * value.abs());
+    let bar = bar.max(SMALLEST_BAR * value.abs());
     let last = exponent(bar) - i32::from(bar / 10_f64.powi(exponent(bar)) < 3.0);
     let bar = (bar / 10_f64.powi(last) - 1e-9).ceil() * 10_f64.powi(last);
     match of_both {
@@ -52,19 +52,13 @@ pub fn plain(value: f64, digits: usize) -> String {
     }
 }
 
-/// A progress bar of `length` after indicatif's `template`. It is silent if standard error is no terminal.
-pub fn progress_bar(template: &str, length: u64) -> ProgressBar {
-    let bar = ProgressBar::new(length);
-    if let Ok(style) = ProgressStyle::with_template(template) {
-        bar.set_style(style);
-    }
-    bar
-}
-
 /// The time between two lines of progress without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
-/// Progress on standard error: a bar on a terminal, otherwise a line every few seconds.
+/// The least length of the bar behind the fields of progress.
+const LEAST_BAR: usize = 8;
+
+/// Progress on standard error: on a terminal a line that stays, otherwise a line every few seconds.
 pub struct Progress {
     bar: ProgressBar,
     started: Instant,
@@ -72,25 +66,32 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// As [`progress_bar`].
-    pub fn new(template: &str, length: u64) -> Self {
-        let now = Instant::now();
-        Self { bar: progress_bar(template, length), started: now, last_line: now }
+    /// Progress of work of this `length`.
+    pub fn new(length: u64) -> Self {
+        let (now, bar) = (Instant::now(), ProgressBar::new(length));
+        if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar}") {
+            bar.set_style(style);
+        }
+        Self { bar, started: now, last_line: now }
     }
 
-    /// Shows the `position` of the work on the length, with a message.
-    pub fn show(&mut self, position: u64, message: String) {
+    /// Shows the `position` of the work on the length, with `fields`, the most important ones first.
+    pub fn show(&mut self, position: u64, mut fields: Vec<String>) {
+        let part = position as f64 / self.bar.length().unwrap_or(position).max(1) as f64;
+        let spent = self.started.elapsed();
+        let words =
+            |time: Duration| humantime::format_duration(Duration::from_secs(time.as_secs()));
+        let left = Duration::try_from_secs_f64(spent.as_secs_f64() * (1.0 / part - 1.0));
+        let left = left.map_or_else(|_| String::new(), |left| format!(", {} left", words(left)));
+        fields.insert(0, format!("{:>3.0} % after {}{left}", 100.0 * part, words(spent)));
         if !self.bar.is_hidden() {
+            let columns = terminal_size::terminal_size_of(io::stderr());
+            let columns = columns.map_or(usize::MAX, |(columns, _)| columns.0.into());
             self.bar.set_position(position);
-            self.bar.set_message(message);
+            self.bar.set_message(fitting(&fields, columns.saturating_sub(LEAST_BAR)));
         } else if self.last_line.elapsed() > BETWEEN_LINES {
             self.last_line = Instant::now();
-            let part = position as f64 / self.bar.length().unwrap_or(position).max(1) as f64;
-            let (percent, seconds) = (100.0 * part, self.started.elapsed().as_secs_f64());
-            let left = seconds / part - seconds;
-            let left = if left.is_finite() { format!(", {left:.0} s left") } else { String::new() };
-            let _ =
-                writeln!(io::stderr(), "  {percent:>3.0} % after {seconds:.0} s{left}  {message}");
+            let _ = writeln!(io::stderr(), "{}", fitting(&fields, usize::MAX));
         }
     }
 
@@ -98,6 +99,13 @@ impl Progress {
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }
+}
+
+/// The first fields in a line of at most so many `columns`; always the first one.
+pub fn fitting(fields: &[String], columns: usize) -> String {
+    let lengths = (0..fields.len()).map(|i| fields[..=i].join("  ").chars().count());
+    let count = lengths.take_while(|length| *length <= columns).count();
+    fields[..count.max(1).min(fields.len())].join("  ")
 }
 
 /// A table of `rows`. Each cell comes with the title of its column. Numbers are aligned to the right in all

@@ -2,10 +2,10 @@
 
 use super::{
     Scene,
-    document::{EXPRESSIONS, map_tables},
+    document::{EXPRESSIONS, absolute, map_tables},
 };
 use crate::mesh;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The first line of the file.
 const FIRST_LINE: &str = "# As run by signorini; the results stand beside it.";
@@ -71,9 +71,4 @@ impl Scene {
         let tables = self.text.tables.iter().flat_map(|(_, content)| content).copied().collect();
         AsRun { text: format!("{FIRST_LINE}\n{scene}"), copies, tables }
     }
-}
-
-/// The full path of a file.
-pub(super) fn absolute(file: &Path) -> PathBuf {
-    std::path::absolute(file).unwrap_or_else(|_| file.to_owned())
 }

@@ -163,7 +163,11 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
     ];
     let conditions: Vec<_> = conditions.into_iter().flatten().collect();
     if let Some([one, other]) = contradiction(&conditions, &conditions) {
-        return Err(("", format!("has {one} and {other}; only one of them can hold")));
+        let problem = format!(
+            "has {one} and {other}; an edge can have only one of them: give the other to another physical curve, \
+             which may end at this one"
+        );
+        return Err(("", problem));
     }
     if conditions.is_empty() {
         let problem = "has nothing in it: give it a displacement, symmetry = true, a traction, a \

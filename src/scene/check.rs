@@ -187,8 +187,7 @@ impl Scene {
                 let [x, y] = midpoint(mesh.nodes[p], mesh.nodes[q]);
                 let problem = format!(
                     "has {has}, but boundary \"{}\" on the same edge at ({x}, {y}) has {others}; \
-                     only one of them can hold there: take the edge out of one of the two physical \
-                     curves",
+                     an edge can have only one of them: take it out of one of the two physical curves",
                     other.name
                 );
                 problems.push(self.at_name(boundary, &problem));

@@ -11,12 +11,19 @@ use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::as_run::absolute;
 use super::error::{MOST_SHOWN, SceneError};
 use crate::suggestion::suggestion;
 
 /// The tables with expressions.
 pub(super) const EXPRESSIONS: [&str; 3] = ["body", "boundary", "damage"];
+
+/// The full path of a file.
+pub(super) fn absolute(file: &Path) -> PathBuf {
+    std::path::absolute(file).unwrap_or_else(|_| file.to_owned())
+}
+
+/// The tables that are lists.
+const LISTS: [&str; 2] = ["boundary", "probe"];
 
 /// The place of a problem and the message.
 pub(super) type Problem = (Range<usize>, String);
@@ -155,9 +162,6 @@ impl SceneText {
     /// Advice for a line that is not TOML. The line contains the byte `at`.
     fn hint(&self, at: usize) -> &'static str {
         let (_, line) = self.line(at).unwrap_or_default();
-        if line.trim_start().starts_with("[boundary]") {
-            return "; boundary is a list, each begins with [[boundary]]";
-        }
         let Some((_, value)) = line.split_once('=') else { return "" };
         // Without texts in quotes, between blanks.
         let bare = format!(" {} ", value.split('"').step_by(2).collect::<String>());
@@ -168,6 +172,24 @@ impl SceneText {
             "; expressions and texts stand in quotes"
         } else {
             ""
+        }
+    }
+
+    /// The problem of a key at `place` that the file has above already, perhaps in another form.
+    fn given_twice(&self, place: &Range<usize>) -> String {
+        let (_, line) = self.line(place.start).unwrap_or_default();
+        let header = line.trim_start().strip_prefix('[').map(|rest| rest.trim_start_matches('['));
+        let path = header.and_then(|rest| rest.split(']').next()).unwrap_or_default();
+        let key = self.file.get(place.clone()).unwrap_or_default();
+        let is_last = path.trim_end().ends_with(key);
+        match path.rsplit_once('.') {
+            _ if LISTS.contains(&key) => format!("{key} is a list, each begins with [[{key}]]"),
+            _ if header.is_none() => format!("{key} is given above already; keep one"),
+            Some((table, _)) if is_last => format!(
+                "{key} is in [{table}] above already; merge the two, or give the surface another name"
+            ),
+            Some(_) => format!("{key} = … stands above; write it as a table [{key}] there"),
+            None => format!("{key} is given above already; merge the two"),
         }
     }
 
@@ -189,15 +211,20 @@ impl SceneText {
     /// Parses the file and inserts the `--set` arguments in their order.
     pub(super) fn parse(&self) -> Result<DeValue<'_>, SceneError> {
         let (root, errors) = DeTable::parse_recoverable(&self.file);
+        let is_duplicate = |error: &toml::de::Error| {
+            error.message() == "duplicate key" || error.message().starts_with("cannot extend value")
+        };
         let syntax = |error: &toml::de::Error| {
             let place = error.span().unwrap_or(NOWHERE);
+            if is_duplicate(error) {
+                return (place.clone(), self.given_twice(&place));
+            }
             self.decimal_comma(place.start).unwrap_or_else(|| {
                 let hint = self.hint(place.start);
                 (place, format!("not valid TOML: {}{hint}", error.message()))
             })
         };
         // After an unclosed table, keys seem to be duplicates.
-        let is_duplicate = |error: &toml::de::Error| error.message() == "duplicate key";
         let all = errors.first().is_none_or(is_duplicate);
         let reported = errors.iter().filter(|error| all || !is_duplicate(error));
         let mut problems: Vec<Problem> = reported.map(syntax).collect();
@@ -209,7 +236,7 @@ impl SceneText {
         for (start, argument) in (1..).map(|n| n * self.stride).zip(&self.arguments) {
             let put = match DeTable::parse(argument) {
                 Ok(given) if argument.contains('=') && !argument.contains('\n') => {
-                    put_all(&mut root, given.into_inner(), "", argument)
+                    self.put_all(&mut root, given.into_inner(), "", argument)
                 }
                 _ => {
                     Err("is no key, `=` and value in one line; write --set KEY=VALUE, as in --set \
@@ -220,6 +247,57 @@ impl SceneText {
             problems.extend(put.err().map(|problem| (start..start, problem)));
         }
         self.refuse(problems).map(|()| root)
+    }
+
+    /// Replaces values in the table, or in the array of named tables, at `key` by the values `given` in an
+    /// `argument`. Dotted keys reach into both. A table in braces replaces the whole old table.
+    fn put_all<'t>(
+        &self,
+        old: &mut DeValue<'t>,
+        given: DeTable<'t>,
+        key: &str,
+        argument: &str,
+    ) -> Result<(), String> {
+        for (name, value) in given {
+            let key = below(key, name.get_ref());
+            let place = value.span();
+            let there = match old {
+                DeValue::Table(table) => table.get_mut(&name),
+                DeValue::Array(tables) => {
+                    tables.iter_mut().find(|table| name_of(table.get_ref()) == Some(name.get_ref()))
+                }
+                _ => None,
+            };
+            let is_braced = argument[place.start..].starts_with('{');
+            let earlier = there.as_deref().map_or(0, last_place) / self.stride;
+            match (there.map(Spanned::get_mut), value.into_inner()) {
+                (Some(there @ (DeValue::Table(_) | DeValue::Array(_))), DeValue::Table(given))
+                    if !is_braced =>
+                {
+                    self.put_all(there, given, &key, argument)?;
+                }
+                _ if earlier > 0 => {
+                    let earlier = &self.sets[earlier - 1];
+                    return Err(format!(
+                        "{key} is given twice, also by --set {earlier} or an option with this value; keep one"
+                    ));
+                }
+                (there, value) => match (there.is_some(), &mut *old) {
+                    (_, DeValue::Table(table)) => {
+                        // The old key has the place of the old value.
+                        table.remove(&name);
+                        table.insert(name, Spanned::new(place, value));
+                    }
+                    (false, DeValue::Array(tables)) => {
+                        let names = tables.iter().filter_map(|table| name_of(table.get_ref()));
+                        let suggestion = suggestion(name.get_ref(), &names.collect::<Vec<_>>());
+                        return Err(format!("unknown key {key}{suggestion}"));
+                    }
+                    _ => return Err(format!("{key} needs a key; write --set {key}.KEY=VALUE")),
+                },
+            }
+        }
+        Ok(())
     }
 }
 
@@ -251,47 +329,14 @@ pub(super) fn with_decimal_comma(text: &str) -> Option<usize> {
     (is_number && mended.parse::<f64>().is_ok()).then_some(number.len())
 }
 
-/// Replaces values in the table, or in the array of named tables, at `key` by the values `given` in an
-/// `argument`. Dotted keys reach into both. A table in braces replaces the whole old table.
-fn put_all<'t>(
-    old: &mut DeValue<'t>,
-    given: DeTable<'t>,
-    key: &str,
-    argument: &str,
-) -> Result<(), String> {
-    for (name, value) in given {
-        let key = below(key, name.get_ref());
-        let place = value.span();
-        let there = match old {
-            DeValue::Table(table) => table.get_mut(&name),
-            DeValue::Array(tables) => {
-                tables.iter_mut().find(|table| name_of(table.get_ref()) == Some(name.get_ref()))
-            }
-            _ => None,
-        };
-        let is_braced = argument[place.start..].starts_with('{');
-        match (there.map(Spanned::get_mut), value.into_inner()) {
-            (Some(there @ (DeValue::Table(_) | DeValue::Array(_))), DeValue::Table(given))
-                if !is_braced =>
-            {
-                put_all(there, given, &key, argument)?;
-            }
-            (there, value) => match (there.is_some(), &mut *old) {
-                (_, DeValue::Table(table)) => {
-                    // The old key has the place of the old value.
-                    table.remove(&name);
-                    table.insert(name, Spanned::new(place, value));
-                }
-                (false, DeValue::Array(tables)) => {
-                    let names = tables.iter().filter_map(|table| name_of(table.get_ref()));
-                    let suggestion = suggestion(name.get_ref(), &names.collect::<Vec<_>>());
-                    return Err(format!("unknown key {key}{suggestion}"));
-                }
-                _ => return Err(format!("{key} needs a key; write --set {key}.KEY=VALUE")),
-            },
-        }
-    }
-    Ok(())
+/// The last place of a value and of the values in it.
+fn last_place(value: &Spanned<DeValue>) -> usize {
+    let inner = match value.get_ref() {
+        DeValue::Table(table) => table.values().map(last_place).max(),
+        DeValue::Array(array) => array.iter().map(last_place).max(),
+        _ => None,
+    };
+    value.span().start.max(inner.unwrap_or(0))
 }
 
 /// The `name` of a boundary's table.

@@ -35,6 +35,7 @@ use crate::{
     fem::Mass,
     mesh::{Mesh, Order},
     model::{DamageLaw, Material},
+    whole_file,
 };
 use document::SceneText;
 use schema::Diagnostics;
@@ -217,11 +218,7 @@ impl Scene {
         }
         let text = std::fs::read(path)
             .map_err(|error| refused(format!("the scene cannot be read: {error}")))?;
-        let text = String::from_utf8(text).map_err(|error| {
-            let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-            let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
-            refused(format!("line {line} is not UTF-8; save the file in this encoding"))
-        })?;
+        let text = whole_file::text(text).map_err(refused)?;
         Self::parse(&text, path, overrides)
     }
 

@@ -111,6 +111,10 @@ impl<'t> Diagnostics<'t> {
             let named = &schema["additionalProperties"];
             let is_named = named["type"] == "number" || (named.is_object() && value.is_table());
             match schema["properties"].get(&**name.get_ref()) {
+                Some(_) if is_named => {
+                    let problem = "has the name of a key; give the physical surface another name";
+                    self.problems.push((place, format!("{key} {problem}")));
+                }
                 Some(schema) => self.check_value(key, place, value, schema),
                 None if is_named => self.check_value(key, place, value, named),
                 None => {

@@ -3,6 +3,7 @@
 mod accepted;
 mod accuracy;
 mod studies;
+mod terminal;
 mod test_directory;
 mod tutorial;
 mod check;
@@ -16,6 +17,7 @@ mod losses;
 mod kept;
 mod keys;
 mod meshes;
+mod odd_names;
 mod provenance;
 mod refused;
 mod restart;

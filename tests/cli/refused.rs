@@ -1,6 +1,9 @@
 //! Bad input: exit code 2, a message that names the place, and nothing touched.
 
-use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, msh};
+use crate::{
+    meshes::GEO,
+    test_directory::{ProgramOutput, SCENE, TestDirectory, msh, square},
+};
 
 /// Runs the scene twice, over the results of an earlier run and into a new folder: both must
 /// be refused and change nothing.
@@ -73,7 +76,7 @@ fn arguments() {
         (&["--mesh", "square.geo", "--set", "mesh.size=1"], &["--set mesh.size=1 has no effect"]),
         (
             &["--set", "time.end=1", "--set", "time.end = 2"],
-            &["--set time.end = 2: its key is given twice"],
+            &["--set time.end = 2: time.end is given twice"],
         ),
         (
             &["--", "-tao_type", "none"],
@@ -97,6 +100,68 @@ fn arguments() {
     test_directory.say(&["run", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
     test_directory.say(&["mesh", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
     assert_eq!(test_directory.say(&[]).code, Some(2));
+}
+
+/// An option and the key that it sets.
+#[test]
+fn an_option_beside_its_key() {
+    let directory = TestDirectory::new();
+    for (option, value, key) in [
+        ("--accuracy", "0.1", "accuracy"),
+        ("--accuracy-of", "work", "accuracy_of"),
+        ("--max-memory", "100", "max_memory"),
+        ("--max-seconds", "10", "max_seconds"),
+        ("--solver", "tao", "contact.solver"),
+    ] {
+        let set = if option == "--accuracy-of" {
+            format!("{key}=['work']")
+        } else {
+            format!("{key}={value}")
+        };
+        let problem = format!("{key} is given twice, also by --set {set}");
+        refused(&directory, &[option, value, "--set", &set], &[&problem]);
+    }
+    directory
+        .say(&["mesh", "scene.toml", "--set", "mesh.sze=1"])
+        .fails(2, &["did you mean `size`?"]);
+}
+
+/// A text in each encoding but UTF-8, as every file that a user writes: one sentence names the file and UTF-8. A byte
+/// order mark before UTF-8 does no harm.
+#[test]
+fn encodings() {
+    let table = "time,load\n0,0\n1,-3\n";
+    let scene = SCENE.replacen("\"-3*t\"", "\"table('load.csv')\"", 1);
+    let geo = GEO.to_owned();
+    let set_geo = ["--set", "mesh.file='square.geo'"];
+    let mesh = square(4);
+    let files = [
+        ("scene.toml", &scene),
+        ("load.csv", &table.to_owned()),
+        ("square.geo", &geo),
+        ("square.msh", &mesh),
+    ];
+    for (name, content) in files {
+        let directory = TestDirectory::new();
+        files.iter().for_each(|(name, content)| directory.write(name, content));
+        let sets = if name == "square.geo" { &set_geo[..] } else { &[] };
+        let check = || directory.say(&[&["check", "scene.toml"], sets].concat());
+        directory.write(name, &format!("\u{feff}{content}"));
+        assert_eq!(check().code, Some(0), "{name}: {:?}", check());
+        for mark in ["\u{feff}", ""] {
+            let words: Vec<u16> = format!("{mark}{content}").encode_utf16().collect();
+            for bytes in [u16::to_le_bytes, u16::to_be_bytes] {
+                std::fs::write(
+                    directory.path(name),
+                    words.iter().flat_map(|w| bytes(*w)).collect::<Vec<_>>(),
+                )
+                .expect("written");
+                let sentence =
+                    if name == "square.msh" { "not a gmsh mesh" } else { "is in UTF-16" };
+                check().fails(2, &[name, sentence]);
+            }
+        }
+    }
 }
 
 #[test]

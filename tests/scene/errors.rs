@@ -1,8 +1,8 @@
 //! Scenes that are not TOML, or with unknown, missing or mistyped keys; how all refusals are checked.
 
-use std::path::Path;
+use std::{path::Path, str::FromStr};
 
-use signorini::scene::Scene;
+use signorini::scene::{SCHEMA, Scene};
 
 use crate::{BASE, mesh::square};
 
@@ -51,7 +51,7 @@ fn every_rule_names_file_line_and_key() {
             }
             [set, message] => {
                 let set = set.strip_prefix("--set ").expect("an argument");
-                (refusal_with(BASE, &["time.step=0.02".to_owned(), set.to_owned()]), message)
+                (refusal_with(BASE, &["title=first".to_owned(), set.to_owned()]), message)
             }
             _ => panic!("no row: {row}"),
         };
@@ -124,7 +124,7 @@ error: bad.toml:33: boundary.load.traction[1] has the unknown variable `s` (know
    |
 33 | traction = ["0", "-80*s"]
    |                  ^^^^^^^
-error: bad.toml:39: boundary.axis has a symmetry and a gap; only one of them can hold
+error: bad.toml:39: boundary.axis has a symmetry and a gap; an edge can have only one of them: give the other to another physical curve, which may end at this one
    |
 39 | [[boundary]]
    | ^^^^^^^^^^^^"#
@@ -158,4 +158,52 @@ fn names_may_look_like_keys_and_are_not_empty() {
     let refused = Scene::parse(BASE, Path::new("p.toml"), &probe);
     let message = refused.expect_err("no name").to_string();
     assert!(message.contains("probe[0].name must be a string that is not empty"), "{message}");
+}
+
+/// The keys of the scene's schema below a table; those of the document for "".
+fn keys_of(table: &str) -> Vec<String> {
+    let schema: serde_json::Value = serde_json::from_str(SCHEMA).expect("JSON");
+    let keys = if table.is_empty() {
+        &schema["properties"]
+    } else {
+        &schema["properties"][table]["properties"]
+    };
+    keys.as_object().expect("keys").keys().cloned().collect()
+}
+
+/// Every key of a scene in every two forms that TOML does not allow together: the message is about this key, not about
+/// the grammar of TOML.
+#[test]
+fn a_key_in_two_forms_is_named() {
+    for key in keys_of("") {
+        let forms =
+            ["= 1", "= { a = 1 }", "= [{ a = 1 }]", ".a = 1"].map(|rest| format!("{key} {rest}\n"));
+        let headers =
+            ["[K]\na = 1\n", "[[K]]\na = 1\n", "[K.part]\na = 1\n"].map(|h| h.replace('K', &key));
+        for first in forms.iter().chain(&headers) {
+            for second in forms.iter().filter(|_| !first.starts_with('[')).chain(&headers) {
+                let text = format!("{first}{second}");
+                if toml::Table::from_str(&text).is_ok() {
+                    continue;
+                }
+                let line = 1 + first.lines().count();
+                let refused = refusal(&text);
+                let names = [&*key, "a", "part"].map(|of| format!("bad.toml:{line}: {of} "));
+                assert!(names.iter().any(|name| refused.starts_with(name)), "{text}{refused}");
+                let jargon = ["duplicate key", "extend", "inline table"];
+                assert!(jargon.iter().all(|words| !refused.contains(words)), "{text}{refused}");
+            }
+        }
+    }
+}
+
+/// No surface may have the name of a key beside its table, whether the scene has the key or not.
+#[test]
+fn a_surface_with_the_name_of_a_key_needs_another_name() {
+    for table in ["material", "damage"] {
+        for key in keys_of(table) {
+            let refused = refusal(&format!("{BASE}\n[{table}.{key}]\nyoung = 1\n"));
+            assert!(refused.contains("surface another name"), "{table}.{key}: {refused}");
+        }
+    }
 }

@@ -16,7 +16,6 @@ fn with(sets: &[&str]) -> Result<Scene, String> {
 #[test]
 fn set_replaces_adds_and_reaches_boundaries_by_name() {
     let scene = with(&[
-        "time.step=0.005",
         "material.plane=strain",
         "damage.initial=1-0.2*y",
         "boundary.load.traction=[\"0\", \"-40*t\"]",
@@ -28,7 +27,7 @@ fn set_replaces_adds_and_reaches_boundaries_by_name() {
         "mesh.parameters.radius = 2",
     ])
     .unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(scene.time, Some(TimeGrid::uniform(1.0, 0.05)), "the last one holds");
+    assert_eq!(scene.time, Some(TimeGrid::uniform(1.0, 0.05)));
     assert_eq!(scene.material.plane, Plane::Strain);
     // A table in braces takes the place of the old one, dotted keys add to it.
     let parameters = [("grading", 4.0), ("radius", 2.0)].map(|(name, v)| (name.to_owned(), v));
@@ -45,4 +44,24 @@ fn set_replaces_adds_and_reaches_boundaries_by_name() {
 fn the_mass_is_chosen_by_its_name() {
     let scene = with(&["damage.mass=lumped"]).expect("complete");
     assert_eq!(scene.damage.expect("given").mass, Mass::Lumped);
+}
+
+/// Two arguments for one key, in any two forms of the key: the second one is refused and names the first.
+#[test]
+fn a_key_is_given_once() {
+    for [first, second] in [
+        ["time.end=1", "time.end=2"],
+        ["time.end=1", "\"time\" . end = 2"],
+        ["time.end=1", "time={end=1, step=0.1}"],
+        ["time={end=1, step=0.1}", "time.step=0.2"],
+        ["boundary.load.traction=[0, 1]", "boundary.'load'.traction=[0, 2]"],
+        ["mesh.parameters.grading=2", "mesh={file='a.geo'}"],
+    ] {
+        let refused = with(&[first, second]).expect_err("given twice").to_string();
+        let key = second.split(['=', '{']).next().expect("a key").replace(['"', '\'', ' '], "");
+        let text = format!("--set {second}: {key} is given twice, also by --set {first}");
+        assert!(refused.contains(&text), "{refused} lacks {text}");
+    }
+    // A table in braces may be completed.
+    with(&["time={end=1, step=0.1}", "time.scheme=bdf2"]).expect("each key once");
 }

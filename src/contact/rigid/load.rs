@@ -16,7 +16,7 @@ const OVER_ESTIMATE: f64 = 2.0;
 #[derive(Debug, Clone, thiserror::Error)]
 #[error(
     "nothing supports the body against {motion}, and the load drives it (resultant ({:.4e}, {:.4e}), \
-     moment about its centre {moment:.4e}): support it by a `displacement`, a `symmetry` axis or a \
+     moment about the centroid of the body {moment:.4e}): support it by a `displacement`, a `symmetry` axis or a \
      `gap`, or balance the load",
     force[0], force[1]
 )]

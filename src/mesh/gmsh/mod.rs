@@ -78,6 +78,9 @@ fn mesh_geo(
     order: Order,
 ) -> Result<Mesh, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
+    if text.contains('\0') {
+        return Err(MeshError::file(geo, "is in UTF-16 or no text; save the file in UTF-8"));
+    }
     // gmsh 4.8 drops the others silently.
     if !text.ends_with('\n')
         && text.lines().last().is_some_and(|last| last.matches(';').count() > 1)

@@ -77,7 +77,7 @@ impl Contents {
         (tag, at): (u64, usize),
         groups: &[i32],
     ) -> Result<()> {
-        let name = match element_type {
+        let (name, mend) = match element_type {
             1 | 8 => {
                 let nodes = node_tags(reader)?;
                 if element_type == 8 {
@@ -99,15 +99,15 @@ impl Contents {
             }
             // A point.
             15 => return node_tags::<1>(reader).map(drop),
-            3 | 10 | 16 | 36 | 37 => "quadrangle",
-            20..=28 => "line or triangle of higher order",
-            4..=7 | 11..=14 | 17..=19 | 29 => "solid",
-            _ => "unknown",
+            3 | 10 | 16 | 36 | 37 => {
+                ("quadrangle", "mesh without Recombine, or cut it into triangles")
+            }
+            20..=28 => ("line or triangle of higher order", "mesh with Mesh.ElementOrder = 1 or 2"),
+            4..=7 | 11..=14 | 17..=19 | 29 => ("solid", "mesh with `gmsh -2`"),
+            _ => ("unknown", "mesh with `gmsh -2`"),
         };
         let problem = format!(
-            "element {tag} is of gmsh's type {element_type} ({name}); only triangles of \
-             order 1 and 2 are supported: mesh with `gmsh -2`, without Recombine and with \
-             Mesh.ElementOrder = 1 or 2"
+            "element {tag} is of gmsh's type {element_type} ({name}), not a triangle of order 1 or 2; {mend}"
         );
         error_at(at, problem)
     }

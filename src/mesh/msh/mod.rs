@@ -26,13 +26,15 @@ use std::{collections::BTreeMap, ffi::OsString, fs, path::Path};
 /// The file cannot be read or converted, or it is not the mesh of a plane body. The message names the place.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
     let bytes = fs::read(path).map_err(MeshError::io(path))?;
-    let Some(version) = foreign_version(&bytes) else { return parse(&bytes, path) };
-    let converted = converted(path, &bytes, version)?;
+    // Some editors begin a text with a byte order mark.
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    let Some(version) = foreign_version(bytes) else { return parse(bytes, path) };
+    let converted = converted(path, bytes, version)?;
     let mesh = sections_of(&converted)
         .and_then(|sections| contents(&sections, version < 4.0))
         // gmsh drops the names that several groups share.
         .and_then(|contents| {
-            let sections = sections_of(&bytes).unwrap_or_default();
+            let sections = sections_of(bytes).unwrap_or_default();
             Ok(Contents { names: names(&sections)?, ..contents })
         })
         .and_then(|contents| body::mesh(&contents));

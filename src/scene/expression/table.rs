@@ -1,5 +1,6 @@
 //! Functions given by points in a file.
 
+use crate::{scene::document::absolute, whole_file};
 use std::path::Path;
 
 /// A piecewise linear function through points (a, f), constant before the first and after the last point.
@@ -18,16 +19,21 @@ impl Table {
     pub(super) fn read(path: &Path) -> Result<Self, String> {
         let failed =
             |error: &dyn std::fmt::Display| format!("the table {}: {error}", path.display());
-        let file = std::fs::File::open(path).map_err(|error| failed(&error))?;
-        if !file.metadata().is_ok_and(|data| data.is_file()) {
+        if absolute(path).to_str().is_none() {
+            return Err(failed(&"the name of a folder is not in UTF-8; rename the folder"));
+        }
+        // Reading a device might never end.
+        if path.exists() && !path.is_file() {
             return Err(failed(&"is no file"));
         }
+        let bytes = std::fs::read(path).map_err(|error| failed(&error))?;
+        let text = whole_file::text(bytes).map_err(|problem| failed(&problem))?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
-            .from_reader(file);
+            .from_reader(text.as_bytes());
         let mut points: Vec<[f64; 2]> = Vec::new();
         for (row, record) in reader.records().enumerate() {
             let record = record.map_err(|error| failed(&error))?;
