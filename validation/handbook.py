@@ -84,9 +84,8 @@ def kind(figure):
 
 
 def values(summary):
-    """All figures of a summary by name."""
-    return {**{k: v for k, v in summary.items() if isinstance(v, (int, float))}, **summary["quantities"],
-            **{k: v["value"] for k, v in summary["extremes"].items()}}
+    """All figures of a summary by name, and the time of a stop."""
+    return {"stopped_at": summary["stopped_at"], **{name: of["value"] for name, of in summary["figures"].items()}}
 
 
 def number(text):
@@ -113,15 +112,17 @@ def rows_of(path, mode, truth, summary, out):
     """A row for each figure of a run that has a truth."""
     with open(out / "history.csv", newline="", encoding="utf-8") as file:
         history = [{name: number(text) for name, text in row.items()} for row in csv.DictReader(file)]
-    given, bars = values(summary), summary["errors"].get("figures") or {}
+    given, bars = values(summary), {name: of["bar"] for name, of in summary["figures"].items()}
     bars["stopped_at"] = summary.get("stopped_uncertainty")
     rows = [*history, {k: v for k, v in given.items() if v is not None}]
-    scale = scales(rows, {*truth, *(name for row in rows for name in row)})
+    # Displacements are those of probes, not the means of boundaries.
+    of_boundary = lambda name: ".u_" in name and f"{name.rpartition('.')[0]}.zeta" not in given
+    scale = scales(rows, {*truth, *(name for row in rows for name in row if not of_boundary(name))})
     held_out = hashlib.sha1(path.stem.encode()).digest()[0] % 2
     for figure, (exact, own) in truth.items():
         value, bar = given.get(figure), bars.get(figure)
         error = None if value is None else abs(value - exact)
-        extreme = summary["extremes"].get(figure) or {}
+        extreme = summary["figures"].get(figure) or {}
         unsettled = any(extreme.get(flag) is not None for flag in ("singular", "unresolved"))
         yield {"scene": path.stem, "half": "held out" if held_out else "open", "mode": mode, "figure": figure,
                "kind": kind(figure), "value": value, "truth": exact, "own": own, "bar": bar, "error": error,

@@ -8,7 +8,7 @@ truth with 1.6 times the sizes and steps tells the first one's own error: their 
 
 An error counts relative to the figure's scale, the largest value in the truth's run: of the largest 1 − ζ for
 `zeta_min` and ζ at a probe, of its mean for `zeta_mean`, of all components of all supports for forces, of all probes' for a kind of probe. Bars are
-`errors.figures` in summary.json where the program writes them. Writes FOLDER/promises.csv (--out): a row for each
+`figures` in summary.json where the program writes them. Writes FOLDER/promises.csv (--out): a row for each
 figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
 
@@ -65,8 +65,13 @@ def figures(summary):
     names += ["zeta_min", "zeta_mean"] if summary["errors"]["damage_steps"] is not None else []
     # Truths do not know the ends of contact well enough.
     left_out = ("moment", "contact_", "pressure_max", "peak_", "acts_at_")
-    others = {k: v for k, v in summary["quantities"].items() if not k.rpartition(".")[2].startswith(left_out)}
-    return {**{name: summary[name] for name in names}, **others}
+    values = {name: of["value"] for name, of in summary["figures"].items()}
+    supports = {name.rpartition(".")[0] for name in values if name.endswith(".moment")}
+    probes = {name.rpartition(".")[0] for name in values if name.endswith(".zeta")}
+    of_parts = {name for name in values if name.rpartition(".")[0] in probes
+                or name.rpartition(".")[0] in supports and "force" in name}
+    names += [name for name in values if name in of_parts and not name.rpartition(".")[2].startswith(left_out)]
+    return {name: values.get(name, 0.0) for name in names}
 
 
 class Truth:
@@ -95,7 +100,7 @@ def compare(truth, summary, result, accuracy, seconds):
     notes = [note for note in summary["notes"] if note.startswith("accuracy ")]
     told = "NOT reached" if any("NOT" in note for note in notes) else "reached" if notes else "?"
     head = {"scene": truth.scene.name, "accuracy": accuracy, "told": told, "seconds": f"{seconds:.2f}"}
-    given, bars = summary["errors"], summary["errors"].get("figures") or {}
+    given, bars = summary["errors"], {name: of["bar"] for name, of in summary["figures"].items()}
     force = max(scale for name, scale in truth.scales.items() if "force" in name)
     for name, value in figures(summary).items():
         scale, bar = truth.scales[name], bars.get(name)

@@ -59,8 +59,8 @@ pub(super) struct ReactionShare {
 #[derive(Debug, Clone)]
 pub(super) struct LineNode {
     pub(super) boundary: usize,
-    /// Half of the length of the edges of a vertex, m; 0 in the middle of an edge.
-    length: f64,
+    /// Half of the length of the edges of a vertex, m; `None` in the middle of an edge.
+    length: Option<f64>,
     /// Its row, without the state.
     row: ContactRow,
 }
@@ -142,7 +142,7 @@ impl ContactLine {
         let face = |face: BoundaryFace| {
             normal.map_or(face, |normal| BoundaryFace::plane(normal, face.length))
         };
-        let line_node = |node: usize, arc_length: f64, length: f64| {
+        let line_node = |node: usize, arc_length: f64, length: Option<f64>| {
             let [x, y] = points[node];
             LineNode { boundary, length, row: ContactRow { arc_length, x, y, ..row.clone() } }
         };
@@ -157,13 +157,13 @@ impl ContactLine {
             let goes_on = !between.contains(&a);
             match self.line_nodes.last_mut() {
                 Some(before) if goes_on && last.is_some_and(|l| l.continues(&faces[0].1)) => {
-                    before.length += 0.5 * length;
+                    before.length = before.length.map(|before| before + 0.5 * length);
                 }
-                _ => self.line_nodes.push(line_node(a, start, 0.5 * length)),
+                _ => self.line_nodes.push(line_node(a, start, Some(0.5 * length))),
             }
             let number = self.line_nodes.len() - 1;
-            self.line_nodes.extend(edge.middle.map(|m| line_node(m, start + half, 0.0)));
-            self.line_nodes.push(line_node(b, start + length, 0.5 * length));
+            self.line_nodes.extend(edge.middle.map(|m| line_node(m, start + half, None)));
+            self.line_nodes.push(line_node(b, start + length, Some(0.5 * length)));
             let numbers = [number, self.line_nodes.len() - 1, number + 1];
             let of_edge = faces.iter().zip(numbers);
             places.extend(of_edge.map(|(&(node, face), n)| (node, face, (n, face.length))));
@@ -321,7 +321,7 @@ impl ContactLine {
             forces[number as usize] += force;
             nodal[number as usize] = Some(pressure);
         }
-        let middles = || (0..line_nodes.len()).filter(|&i| line_nodes[i].length == 0.0);
+        let middles = || (0..line_nodes.len()).filter(|&i| line_nodes[i].length.is_none());
         let arc = |i: usize| line_nodes[i].row.arc_length;
         for i in middles() {
             let (a, b, length) = (i - 1, i + 1, arc(i + 1) - arc(i - 1));
@@ -332,10 +332,13 @@ impl ContactLine {
             forces[a] += share;
             forces[b] += forces[i] - share;
         }
-        let vertices = line_nodes.iter().zip(&mut forces).filter(|(of, _)| of.length > 0.0);
-        vertices.for_each(|(of, force)| *force /= of.length);
+        for (of, force) in line_nodes.iter().zip(&mut forces) {
+            *force /= of.length.unwrap_or(1.0);
+        }
         for seam in &self.seams {
-            let [p, q] = seam.map(|line_node| (line_nodes[line_node].length, forces[line_node]));
+            let [p, q] = seam.map(|line_node| {
+                (line_nodes[line_node].length.unwrap_or_default(), forces[line_node])
+            });
             let mean = (p.0 * p.1 + q.0 * q.1) / (p.0 + q.0);
             seam.iter().for_each(|line_node| forces[*line_node] = mean);
         }

@@ -64,8 +64,8 @@ fn history() {
     assert_eq!(rows.len(), 11);
     let column = |name: &str| names.iter().position(|n| n == name).expect("a column");
     for (n, row) in rows.iter().enumerate() {
-        assert_eq!(row[0], n as f64);
-        assert!((row[1] - 0.1 * n as f64).abs() < 1e-12);
+        assert_eq!(row[column("step")], n as f64);
+        assert!((row[column("time")] - 0.1 * n as f64).abs() < 1e-12);
         assert!((row[column("contact_force")] - 0.3 * n as f64).abs() < 1e-8);
     }
     let summary = test_directory.summary("out/scene");
