@@ -103,9 +103,9 @@ fn interrupted(signal: Signal) -> Failure {
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 
-/// The ratio by which to reduce the tolerance of the time steps, so that all figures become exact enough, if these steps
-/// miss the required accuracy and the mesh leaves them a part of it. At most ½; at least 1/64, with which there are about four
-/// times as many steps, as the error of a step is of third order.
+/// The factor for the tolerance of the time steps in a second run, if the time steps of the first one miss the required
+/// accuracy and the mesh leaves them a part of it. It is at most ½, and at least 1/64: the error of a step is of third order,
+/// so there are then about four times as many steps.
 pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     let accuracy = task.problem.scene().accuracy?;
     let bars = task.measured.bars.iter().zip(&outcome.bars);

@@ -35,7 +35,7 @@ pub struct ContactProblem<'a> {
     /// The ranks among which the unknowns are divided. The owner of an unknown knows its bound. All ranks
     /// decide together.
     pub comm: Communicator,
-    /// The phases `contact/…` to which the parts of the solve book their time.
+    /// The phases `contact/…` to which the parts of the solve add their time.
     pub phases: &'a Phases,
 }
 

@@ -108,9 +108,9 @@ pub struct ContactReport {
     pub iterations: usize,
     /// Iterations of linear solvers inside, each a pair of triangular solves.
     pub linear_iterations: usize,
-    /// Factorisations (not those of a preconditioner chosen by PETSc options).
+    /// Factorisations of our own factor. Those of a preconditioner that PETSc options choose are not counted.
     pub factorisations: usize,
-    /// Times the method left its fast path for a slower one that always ends, or another solver replaced it.
+    /// How often the method changed to a slower variant that always ends, and how often another solver replaced it.
     pub fallbacks: usize,
     /// The solver that computed the answer in place of the chosen one.
     pub rescued_by: Option<&'static str>,

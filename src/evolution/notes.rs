@@ -3,7 +3,7 @@
 use super::{Accuracy, DiscreteProblem, Outcome, percent};
 use crate::{
     fem::for_elements,
-    mesh::extent,
+    mesh::{distance, extent},
     scene::{Stepping, rounded},
 };
 
@@ -118,8 +118,7 @@ impl DiscreteProblem {
         let (body, kappa) = (&self.body, self.diffusions());
         let rate = |(t, corners): (usize, &[usize; 3])| {
             let [a, b, c] = corners.map(|node| body.mesh.nodes[node]);
-            let side = |[x, y]: [f64; 2], [v, w]: [f64; 2]| (x - v).hypot(y - w);
-            let h = side(a, b).max(side(b, c)).max(side(c, a));
+            let h = distance(a, b).max(distance(b, c)).max(distance(c, a));
             kappa.get(body.material(t)).map_or(f64::INFINITY, |kappa| kappa / (h * h))
         };
         let own = body.mesh.triangles.iter().enumerate().map(rate).fold(f64::INFINITY, f64::min);

@@ -47,10 +47,11 @@ pub struct Outcome {
     /// A note on contact between the nodes.
     #[serde(skip)]
     pub(crate) penetration: Option<String>,
-    /// Estimated error of the last ζ over the damage done, for adaptive steps.
+    /// With adaptive steps: the estimated error of the last ζ from the time steps, relative to the damage done.
     #[serde(skip)]
     pub damage_error: Option<f64>,
-    /// The steps with the maximum stationarity residual and the maximum displacement before the last step.
+    /// Of all steps before the last one: the step with the largest stationarity residual, and the step with the largest
+    /// displacement.
     pub(super) least_accurate: Option<Rc<Step>>,
     most_displaced: Option<Rc<Step>>,
 }

@@ -32,11 +32,11 @@ use std::mem::take;
 /// the part (ζ − ζ₀)/ζ₀ of such forces would remain.
 pub struct Factor {
     comm: Communicator,
-    /// The number of rows of the matrices to condense, and the owned unknowns that [`Self::prescribe`] may
-    /// prescribe.
+    /// Matrices with this number of rows are condensed to the unknowns that may be prescribed later, and these owned
+    /// unknowns ([`Self::set_condensed`]).
     condensed: (usize, Vec<usize>),
-    /// The number of rows of its matrices, and the factor. `None` if the matrices or their interface are too
-    /// large.
+    /// The number of rows of the analysed matrix, and its factor, which is `None` if the matrix or the interface
+    /// between the ranks is too large.
     substructure: Option<(usize, Option<Box<Substructure>>)>,
     /// The state that checkpoints keep.
     state: FactorState,

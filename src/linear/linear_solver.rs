@@ -121,7 +121,7 @@ impl LinearSolver {
         self.residual.axpby(1.0, b, -1.0)?;
         self.norm = self.residual.free_norm(system.prescribed)?;
         self.first_norm = self.norm;
-        if self.norm > limit && self.factor.exists() && self.is_own(system.matrix)? {
+        if self.norm > limit && self.factor.exists() && self.uses_factor(system.matrix)? {
             self.factor.set_scaling(system.matrix)?;
         }
         Ok(self.is_small(limit))
@@ -160,7 +160,7 @@ impl LinearSolver {
         let (bytes, residual) = (0.5 * self.factor.bytes_per_application(), &self.residual);
         let factor = &mut self.factor;
         let name = |phase_names: &PhaseNames| phase_names.triangular_solves;
-        system.book(name, (0.5, bytes), || factor.condense(residual)).map(Some)
+        system.timed(name, (0.5, bytes), || factor.condense(residual)).map(Some)
     }
 
     /// Back substitution: `x` ← `x` + d from the last solution for the condensed unknowns. If no prescribed
@@ -176,7 +176,7 @@ impl LinearSolver {
     ) -> Result<(), PetscError> {
         let (bytes, d) = (0.5 * self.factor.bytes_per_application(), &mut self.expanded);
         let expand = || self.factor.expand(d);
-        system.book(|phase_names| phase_names.triangular_solves, (0.5, bytes), expand)?;
+        system.timed(|phase_names| phase_names.triangular_solves, (0.5, bytes), expand)?;
         self.prepared = !moved;
         if moved {
             self.iterations += 1;
@@ -203,7 +203,7 @@ impl LinearSolver {
         let mut report =
             SolveReport { converged, iterations: self.iterations, ..SolveReport::default() };
         if !converged
-            && let Some(most) = self.factor.iteration_limit(self.asked(limit))
+            && let Some(most) = self.factor.iteration_limit(self.needed_reduction(limit))
             && self.is_ready(system)?
         {
             self.iterate(system, x, (limit, Some(most)), &mut report)?;
@@ -218,7 +218,7 @@ impl LinearSolver {
     }
 
     /// ln(‖r₀‖₂ / `limit`): the reduction of the residual that the solve needs.
-    fn asked(&self, limit: f64) -> f64 {
+    fn needed_reduction(&self, limit: f64) -> f64 {
         (self.first_norm / limit).ln()
     }
 
@@ -231,8 +231,8 @@ impl LinearSolver {
         (limit, most): (f64, Option<usize>),
         report: &mut SolveReport,
     ) -> Result<(), PetscError> {
-        let most = most.or(self.is_own(system.matrix)?.then_some(MOST_ITERATIONS));
-        self.modify(system)?;
+        let most = most.or(self.uses_factor(system.matrix)?.then_some(MOST_ITERATIONS));
+        self.prescribe_in_copy(system)?;
         let prescribed = system.prescribed.unwrap_or(&[]);
         let clear = |d: &mut [f64]| prescribed.iter().for_each(|&i| d[i] = 0.0);
         if self.modified.is_some() {
@@ -267,7 +267,7 @@ impl LinearSolver {
     /// of `limit`.
     pub fn end_solve(&mut self, iterations: usize, norm: f64, limit: f64) {
         let reached = (self.first_norm / norm).ln();
-        let reduction = Reduction { asked: self.asked(limit), reached };
+        let reduction = Reduction { asked: self.needed_reduction(limit), reached };
         self.factor.end_solve(Some(iterations), reduction);
     }
 

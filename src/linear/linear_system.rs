@@ -15,7 +15,7 @@ pub struct LinearSystem<'a> {
     /// The size of the diagonal entries of A. Prescribed unknowns get this diagonal entry in the factored
     /// matrix.
     pub scale: f64,
-    /// The phases to which the parts of a solve book their time.
+    /// The phases to which the parts of a solve add their time.
     pub phase_names: Option<PhaseNames<'a>>,
 }
 
@@ -43,11 +43,11 @@ impl<'a> LinearSystem<'a> {
     /// `y` ← A `x`.
     pub(super) fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
         let bytes = self.matrix.bytes_per_product();
-        self.book(|phase_names| phase_names.product, (1.0, bytes), || self.matrix.multiply(x, y))
+        self.timed(|phase_names| phase_names.product, (1.0, bytes), || self.matrix.multiply(x, y))
     }
 
-    /// Does `work`, which is this part of a call and reads and writes these bytes, and books its time under a name.
-    pub(super) fn book<R>(
+    /// Does `work`, which is this part of a call and reads and writes these bytes, and adds its time to a phase.
+    pub(super) fn timed<R>(
         self,
         name: impl FnOnce(&PhaseNames) -> &'static str,
         moved: (f64, f64),

@@ -15,7 +15,6 @@ use super::{
     tiles::{DiagonalBlock, Number, PANEL_WIDTH, TILE_HEIGHT, Tile, subtract, transposed_product},
 };
 use nalgebra::{convert, convert_unchecked};
-use std::mem::take;
 
 /// Solves with the first rows and columns of a factor and eliminates them from the others: see
 /// [`Cholesky::solve`](super::Cholesky::solve).
@@ -124,12 +123,10 @@ impl<T: Number> Supernodal<T> {
             let own = s.first..s.first + s.columns;
             front.fill([T::zero(); TILE_HEIGHT]);
             front.as_flattened_mut()[..s.columns].copy_from_slice(&self.y[own.clone()]);
-            let (panels, others) = diagonal.split_at(s.panels());
-            diagonal = others;
+            let panels = diagonal.split_off(..s.panels()).unwrap_or_default();
             for (k, panel) in panels.iter().enumerate() {
                 let first_tile = Supernode::first_tile(k);
-                let (below, others) = tiles.split_at(s.front_height() - first_tile);
-                tiles = others;
+                let below = tiles.split_off(..s.front_height() - first_tile).unwrap_or_default();
                 let head = &mut front.as_flattened_mut()[PANEL_WIDTH * k..PANEL_WIDTH * (k + 1)];
                 let solved = panel.forward(head);
                 head.copy_from_slice(&solved);
@@ -137,8 +134,7 @@ impl<T: Number> Supernodal<T> {
             }
             let front = front.as_flattened();
             self.y[own].copy_from_slice(&front[..s.columns]);
-            let (below, others) = rows.split_at(s.below);
-            rows = others;
+            let below = rows.split_off(..s.below).unwrap_or_default();
             for (&row, &change) in below.iter().zip(&front[PANEL_WIDTH * s.panels()..]) {
                 self.y[row as usize] += change;
             }
@@ -155,17 +151,15 @@ impl<T: Number> Supernodal<T> {
             front.fill([T::zero(); TILE_HEIGHT]);
             let entries = front.as_flattened_mut();
             entries[..s.columns].copy_from_slice(&self.y[own.clone()]);
-            let (others, below) = rows.split_at(rows.len() - s.below);
-            rows = others;
+            let below = rows.split_off(rows.len() - s.below..).unwrap_or_default();
             for (&row, value) in below.iter().zip(&mut entries[PANEL_WIDTH * s.panels()..]) {
                 *value = self.y[row as usize];
             }
-            let (others, panels) = diagonal.split_at(diagonal.len() - s.panels());
-            diagonal = others;
+            let panels = diagonal.split_off(diagonal.len() - s.panels()..).unwrap_or_default();
             for (k, panel) in panels.iter().enumerate().rev() {
                 let first_tile = Supernode::first_tile(k);
-                let (others, below) = tiles.split_at(tiles.len() - (s.front_height() - first_tile));
-                tiles = others;
+                let first = tiles.len() - (s.front_height() - first_tile);
+                let below = tiles.split_off(first..).unwrap_or_default();
                 let sums = transposed_product(below, &front[first_tile..]);
                 let head = &mut front.as_flattened_mut()[PANEL_WIDTH * k..PANEL_WIDTH * (k + 1)];
                 let solved = panel.backward(head, sums);
@@ -193,17 +187,14 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
         let starts: Vec<usize> = factor.supernodes().map(|(.., start)| start).collect();
         // From the last supernode on: values at the end of the factor can be freed.
         for (s, start) in self.supernodes.iter().zip(starts).rev() {
-            let (others, panels) = split_back(diagonal, s.panels());
-            diagonal = others;
-            let (others, mut own_tiles) = split_back(tiles, s.tiles());
-            tiles = others;
+            let panels = diagonal.split_off_mut(diagonal.len() - s.panels()..).unwrap_or_default();
+            let mut own_tiles = tiles.split_off_mut(tiles.len() - s.tiles()..).unwrap_or_default();
             let height = s.columns + s.below;
             let values = &factor.values()[start..start + s.columns * height];
             for (k, panel) in panels.iter_mut().enumerate() {
                 let first_tile = Supernode::first_tile(k);
-                let (below, others) =
-                    take(&mut own_tiles).split_at_mut(s.front_height() - first_tile);
-                own_tiles = others;
+                let height_below = s.front_height() - first_tile;
+                let below = own_tiles.split_off_mut(..height_below).unwrap_or_default();
                 let end = s.columns.min(PANEL_WIDTH * (k + 1));
                 for j in PANEL_WIDTH * k..end {
                     let column = &values[j * height..(j + 1) * height];
@@ -247,9 +238,4 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
     fn bytes(&self) -> f64 {
         2.0 * (size_of_val(&self.tiles[..]) + size_of_val(&self.diagonal[..])) as f64
     }
-}
-
-/// The last `count` entries and the rest.
-fn split_back<U>(entries: &mut [U], count: usize) -> (&mut [U], &mut [U]) {
-    entries.split_at_mut(entries.len() - count)
 }

@@ -92,13 +92,13 @@ impl Mesh {
         place(extent(&self.nodes), at)
     }
 
-    /// The edges of the boundary (those of a single triangle), the body on their left.
+    /// The edges of the boundary, which belong to one triangle each. The body lies on their left.
     pub fn boundary_edges(&self) -> Vec<[usize; 2]> {
         boundary_edges(&sides(&self.triangles))
     }
 
-    /// The sizes of the triangles at the nodes of a mesh, m, that has `wanted` ones at some of these: elsewhere the mean length
-    /// of the sides, but at most the size at a neighbour and a third of the distance.
+    /// Per node: the size that triangles shall have there, m. It is the `wanted` size where one is given, and elsewhere the
+    /// mean length of the sides at the node. From node to node it grows by at most a third of their distance.
     pub fn graded_sizes(&self, wanted: impl IntoIterator<Item = (usize, f64)>) -> Vec<f64> {
         let sides = || self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let mut sums = vec![(0.0, 0.0); self.nodes.len()];
@@ -171,7 +171,7 @@ fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     sides
 }
 
-/// The edges with a single one of the `sides`, which are sorted; the body on their left.
+/// The edges that have one of the sorted `sides` only: the boundary, with the body on the left.
 fn boundary_edges(sides: &[Side]) -> Vec<[usize; 2]> {
     let single = sides.chunk_by(|a, b| a.edge == b.edge).filter(|sides| sides.len() == 1);
     single.map(|sides| sides[0].directed()).collect()
@@ -215,4 +215,9 @@ pub fn place(extent: f64, at: [f64; 2]) -> String {
 /// Twice the signed area of the triangle abc, m², positive when counter-clockwise.
 pub fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
+}
+
+/// The distance of two points, m.
+pub fn distance([x, y]: [f64; 2], [v, w]: [f64; 2]) -> f64 {
+    (v - x).hypot(w - y)
 }

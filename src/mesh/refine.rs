@@ -6,7 +6,7 @@
 //! shapes, whose angles are at least half its smallest one (I. G. Rosenberg, F. Stenger, SIAM J.
 //! Numer. Anal. 12, 1975), and those of a right isosceles triangle are right isosceles.
 
-use super::{Mesh, MeshError, Side, sides, twice_area};
+use super::{Mesh, MeshError, Side, sides, sorted, twice_area};
 
 /// Slightly below 1: sizes whose ratio is between this and 1 are equal up to rounding. So meshes do not depend on units.
 pub(crate) const TIES: f64 = 1.0 - 1e-9;
@@ -77,7 +77,8 @@ impl Refinement {
         mesh.nodes.extend(halved_edges.iter().map(|&ends| self.mesh.midpoint(ends)));
         for curve in mesh.curves.values_mut() {
             let halves = |&[a, b]: &[usize; 2]| {
-                let middle = edges.find([a, b]).and_then(|edge| new_node[edge]);
+                let middle =
+                    edges.ends.binary_search(&sorted([a, b])).ok().and_then(|edge| new_node[edge]);
                 middle.map_or(vec![[a, b]], |m| vec![[a, m], [m, b]])
             };
             curve.edges = curve.edges.iter().flat_map(halves).collect();
@@ -176,10 +177,6 @@ impl Edges {
             }
         }
         edges
-    }
-
-    fn find(&self, [a, b]: [usize; 2]) -> Option<usize> {
-        self.ends.binary_search(&[a.min(b), a.max(b)]).ok()
     }
 
     /// The edges to halve, in increasing order: the reference edges of the `marked` triangles and of all

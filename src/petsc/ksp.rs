@@ -32,8 +32,9 @@ pub(crate) struct Ksp {
 pub(crate) struct KspProblem<'a> {
     /// A; PETSc's own preconditioners are made from it.
     pub(crate) matrix: &'a Matrix,
-    /// Owned unknowns that stay 0: b is 0 there, and either P⁻¹r is 0 there or their rows and columns of A
-    /// have only the diagonal entry. `None` if no rank prescribes unknowns.
+    /// The owned unknowns with prescribed values, whose correction x is 0. The caller sets b to 0 there. P⁻¹r must be 0
+    /// there too, or the rows and columns of these unknowns in A must have no entry but the diagonal one. `None` if no
+    /// rank prescribes unknowns.
     pub(crate) prescribed: Option<&'a [usize]>,
     /// The largest accepted ‖b − A x‖₂ of the free unknowns.
     pub(crate) limit: f64,

@@ -21,7 +21,7 @@ use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge},
-    mesh::{BoundaryFace, Lines, joined_faces},
+    mesh::{BoundaryFace, Lines, distance, joined_faces},
     scene::{Expression, Gap},
 };
 use serde::Serialize;
@@ -137,8 +137,7 @@ impl ContactLine {
         edges: &[Edge],
         places: &mut Vec<(usize, BoundaryFace, Place)>,
     ) {
-        let distance =
-            |a: usize, b: usize| (points[a][0] - points[b][0]).hypot(points[a][1] - points[b][1]);
+        let distance = |a: usize, b: usize| distance(points[a], points[b]);
         let face = |face: BoundaryFace| {
             normal.map_or(face, |normal| BoundaryFace::plane(normal, face.length))
         };

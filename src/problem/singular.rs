@@ -76,8 +76,9 @@ fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2
     values.windows(2).map(|pair| (pair[1] * pair[0].conj()).arg()).sum::<f64>() > FRAC_PI_2
 }
 
-/// The rank of a support in the order of constraint, and the possible conditions on its side, which leaves its node at an
-/// `angle`, rad. Contact slides where it is closed, and is free where it is open.
+/// How strongly a support constrains its side of a corner (0 free, then contact, symmetry, clamped), and the equations that
+/// may hold on this side, which leaves the corner at an `angle`, rad. On Γ_C there are two: the body slides where contact is
+/// closed, and the side is free where it is open.
 fn conditions(support: Option<&Support>, angle: f64) -> (u8, Vec<Matrix2x4<f64>>) {
     let sliding = |direction: Option<[f64; 2]>| {
         let (sine, cosine) = direction.map_or(FRAC_PI_2, |[x, y]| y.atan2(x) - angle).sin_cos();

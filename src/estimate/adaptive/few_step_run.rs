@@ -118,7 +118,7 @@ impl<'a> FewStepRun<'a> {
         self.extremes.ends.iter().map(half).sum()
     }
 
-    /// This length over the largest length of contact.
+    /// [`Self::open_length`] relative to the largest length of contact in the run; 0 without contact ends.
     pub(super) fn open(&self) -> f64 {
         let length = self.problem.figures.number("contact_length");
         let length = length.map(|number| self.outcome.sizes(self.problem)[number]);

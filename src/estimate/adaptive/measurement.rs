@@ -208,8 +208,7 @@ impl Measurement {
         self.unsettled = unsettled.map(|of| of.name.clone()).collect();
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
-            Dimension::Stress => sequence.error_of_stress(i),
-            _ => sequence.error(i),
+            dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
         self.bars = problem.bars(&errors, &fine.scales(&self.unsettled));

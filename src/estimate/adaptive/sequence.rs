@@ -107,14 +107,9 @@ impl<'a> Sequence<'a> {
         safety * (largest + changes[changes.len() - 1] * self.rate / (1.0 - self.rate))
     }
 
-    /// The bar of the figure `i`.
-    pub(super) fn error(&self, i: usize) -> f64 {
-        self.bar(SAFETY[0], |a, b| (a.values[i] - b.values[i]).abs())
-    }
-
-    /// The bar of the figure `i`, a stress.
-    pub(super) fn error_of_stress(&self, i: usize) -> f64 {
-        self.bar(SAFETY[1], |a, b| (a.values[i] - b.values[i]).abs())
+    /// The bar of the figure `i`, which may be a stress.
+    pub(super) fn error(&self, i: usize, is_stress: bool) -> f64 {
+        self.bar(SAFETY[usize::from(is_stress)], |a, b| (a.values[i] - b.values[i]).abs())
     }
 
     /// The bar of the figure `i`, a length of contact. A change within the open parts is no error beyond them.

@@ -5,7 +5,7 @@
 
 use crate::{
     fem::ON_SIDE,
-    mesh::{Mesh, MeshError, Refinement, TIES, twice_area},
+    mesh::{Mesh, MeshError, Refinement, TIES, distance, twice_area},
 };
 
 /// Minimum factor by which the size of a triangle is multiplied in a round.
@@ -52,12 +52,12 @@ pub(super) fn influences(
     mesh: &Mesh,
     shares: &[f64],
     order: i32,
-    [x, y]: [f64; 2],
+    point: [f64; 2],
     derivative: i32,
 ) -> Vec<f64> {
     let influence = |((nodes, share), area): ((&[usize; 3], &f64), f64)| {
         let size = (2.0 * area).sqrt();
-        let near = nodes.map(|node| (mesh.nodes[node][0] - x).hypot(mesh.nodes[node][1] - y));
+        let near = nodes.map(|node| distance(mesh.nodes[node], point));
         let distance = near.into_iter().fold(f64::INFINITY, f64::min).max(size);
         share.sqrt() * size.powi(order + 1) / distance.powi(order + 1 + derivative)
     };

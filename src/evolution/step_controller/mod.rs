@@ -239,7 +239,8 @@ impl<'a> StepController<'a> {
             // The fraction of the step after which ζ falls to ζ_*.
             let fraction =
                 if from > threshold { (from - threshold) / (from - zeta_min) } else { 0.0 };
-            // Both the last written ζ and its correction ζ̃ must be near ζ_*.
+            // Both the last written ζ and its correction ζ̃ must be near ζ_*. A shorter step is to end a tenth before ζ_* is
+            // reached, as ζ falls faster near it, but has at least a hundredth of the length.
             if let Some(error_control) = &self.error_control
                 && from.max(last.record.zeta_min) - threshold > error_control.stop_distance()
                 && let Some(shorter) = self.retry(planned, (0.9 * fraction).max(0.01))
@@ -256,7 +257,8 @@ impl<'a> StepController<'a> {
         let [error, rate, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
         // An error δζ delays the stop by δζ/ζ′.
         let delay = (error / rate).abs();
-        // The time is interpolated with a constant rate.
+        // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
+        // by at most half of their relative difference, as a fraction of the step. With uniform steps the last step is the bar.
         let of_step = match self.error_control {
             Some(_) => (0.5 * ((rate - rate_before) / rate).abs()).min(1.0),
             None => 1.0,

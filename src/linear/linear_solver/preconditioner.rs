@@ -24,7 +24,7 @@ impl LinearSolver {
         let comm = session.comm();
         let own = Pattern::new(1, iter::once((0, comm.rank() as i32)));
         let identity = Matrix::with_pattern(session, 1, &own, &[1.0])?;
-        let chosen = solver.is_own(&identity);
+        let chosen = solver.uses_factor(&identity);
         if comm.any(chosen.is_err()) || matches!(chosen, Ok(true)) {
             return chosen.map(drop);
         }
@@ -36,7 +36,7 @@ impl LinearSolver {
     }
 
     /// Is the factor the preconditioner of matrices of this size? The first such matrix decides. Collective.
-    pub(super) fn is_own(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
+    pub(super) fn uses_factor(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
         let rows = matrix.size()?;
         let own = match self.chosen {
             Some((size, own)) if size == rows => own,
@@ -83,7 +83,7 @@ impl LinearSolver {
     /// # Errors
     /// PETSc failed.
     pub fn is_condensed(&mut self, matrix: &Matrix) -> Result<bool, PetscError> {
-        Ok(self.is_own(matrix)? && self.factor.analyse(matrix)? && self.factor.is_condensed())
+        Ok(self.uses_factor(matrix)? && self.factor.analyse(matrix)? && self.factor.is_condensed())
     }
 
     /// Makes a new preconditioner of the system. It returns false if the system is not positive definite.
@@ -92,13 +92,13 @@ impl LinearSolver {
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let set_up = || self.set_up(system);
-        system.book(|phase_names| phase_names.factorisation, (1.0, 0.0), set_up)
+        system.timed(|phase_names| phase_names.factorisation, (1.0, 0.0), set_up)
     }
 
     fn set_up(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         self.prepared = false;
-        let own = self.is_own(system.matrix)?;
-        self.modify(system)?;
+        let own = self.uses_factor(system.matrix)?;
+        self.prescribe_in_copy(system)?;
         let matrix = self.modified.as_ref().unwrap_or(system.matrix);
         let definite = self.ksp.set_up(matrix, &mut self.factor)?;
         if !own {
@@ -109,7 +109,7 @@ impl LinearSolver {
 
     /// Prescribes unknowns in a copy of the matrix. A condensed factor needs no copy: it prescribes them
     /// itself.
-    pub(super) fn modify(&mut self, system: LinearSystem) -> Result<(), PetscError> {
+    pub(super) fn prescribe_in_copy(&mut self, system: LinearSystem) -> Result<(), PetscError> {
         let before = self.modified.take();
         let Some(prescribed) = system.prescribed else { return Ok(()) };
         if self.is_condensed(system.matrix)? {
@@ -128,7 +128,7 @@ impl LinearSolver {
     /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
     pub(super) fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
-        system.book(|phase_names| phase_names.prescription, (1.0, 0.0), prescribe)
+        system.timed(|phase_names| phase_names.prescription, (1.0, 0.0), prescribe)
     }
 
     /// Makes the preconditioner of a checkpoint again.
@@ -144,7 +144,9 @@ impl LinearSolver {
 
     /// Has a solve used all iterations that the preconditioner is worth?
     pub fn is_slow(&self, iterations: usize, limit: f64) -> bool {
-        self.factor.iteration_limit(self.asked(limit)).is_none_or(|most| iterations >= most)
+        self.factor
+            .iteration_limit(self.needed_reduction(limit))
+            .is_none_or(|most| iterations >= most)
     }
 
     /// Prescribes unknowns in a condensed factor. It returns false if there is no preconditioner afterwards.
@@ -155,7 +157,7 @@ impl LinearSolver {
     }
 }
 
-/// The factor during a solve; its time is booked.
+/// The factor during a solve, whose applications are timed.
 pub(super) struct TimedFactor<'a> {
     pub(super) factor: &'a mut Factor,
     /// P⁻¹ r of the first residual, if it is known.
@@ -175,6 +177,6 @@ impl ShellPreconditioner for TimedFactor<'_> {
         }
         let bytes = self.factor.bytes_per_application();
         let apply = || self.factor.apply(r, z);
-        self.system.book(|phase_names| phase_names.triangular_solves, (1.0, bytes), apply)
+        self.system.timed(|phase_names| phase_names.triangular_solves, (1.0, bytes), apply)
     }
 }

@@ -24,7 +24,7 @@ const IMPURE: [&str; 2] = ["SystemCall", "GetEnv"];
 /// The files from which gmsh makes a mesh.
 pub struct Inputs {
     /// The contents of the `.geo` and of all files that it names, directly or through others.
-    contents: Vec<Vec<u8>>,
+    pub contents: Vec<Vec<u8>>,
     /// Whether the mesh depends on these files alone.
     pub are_all: bool,
 }
@@ -55,11 +55,6 @@ impl Inputs {
             inputs.contents.push(bytes);
         }
         Ok(inputs)
-    }
-
-    /// Whether the `.geo` reads no other files.
-    pub fn are_one_file(&self) -> bool {
-        self.contents.len() == 1 && self.are_all
     }
 
     /// The digest of these files, of the options that the user has saved in gmsh, and of what else gmsh gets.

@@ -176,7 +176,7 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
 
 /// Whether a `.geo` reads no other file.
 pub fn is_self_contained(geo: &Path) -> bool {
-    Inputs::read(geo).is_ok_and(|inputs| inputs.are_one_file())
+    Inputs::read(geo).is_ok_and(|inputs| inputs.contents.len() == 1 && inputs.are_all)
 }
 
 /// Whether the `.geo` file `text` sets the largest length of an edge from the parameter `size`.

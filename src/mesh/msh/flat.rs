@@ -1,6 +1,6 @@
 //! Triangles without area.
 
-use crate::mesh::{Side, sides, sorted, twice_area};
+use crate::mesh::{Side, distance, sides, sorted, twice_area};
 use std::collections::BTreeMap;
 
 /// Twice the area over the square of the longest side: below this value a triangle is flat.
@@ -10,8 +10,7 @@ const OF_COORDINATES: f64 = 4.0 * f64::EPSILON;
 
 /// The largest twice the area (m²) of a flat triangle with these vertices.
 pub fn bound([a, b, c]: [[f64; 2]; 3]) -> f64 {
-    let length = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
-    let longest = length(a, b).max(length(b, c)).max(length(c, a));
+    let longest = distance(a, b).max(distance(b, c)).max(distance(c, a));
     let coordinate = [a, b, c].as_flattened().iter().fold(0.0_f64, |max, x| max.max(x.abs()));
     longest * (FLAT * longest + OF_COORDINATES * coordinate)
 }
@@ -70,9 +69,7 @@ pub fn mend(
 
 /// The longest side of a triangle, its ends in increasing order, and the opposite vertex.
 fn longest_side(nodes: &[[f64; 2]], [a, b, c]: [usize; 3]) -> ([usize; 2], usize) {
-    let length = |&([p, q], _): &([usize; 2], usize)| {
-        (nodes[q][0] - nodes[p][0]).hypot(nodes[q][1] - nodes[p][1])
-    };
+    let length = |&([p, q], _): &([usize; 2], usize)| distance(nodes[p], nodes[q]);
     let sides = [(sorted([a, b]), c), (sorted([b, c]), a), (sorted([c, a]), b)];
     sides.into_iter().max_by(|s, t| length(s).total_cmp(&length(t))).unwrap_or(sides[0])
 }
