@@ -48,7 +48,7 @@ impl DiscreteProblem {
     pub(crate) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
         let recovered = RecoveredStrains::new(&self.body, u)?;
         let zeta = self.zeta_at_points(zeta);
-        Ok(recovered.energy_error(&self.elasticity, &zeta, u).relative())
+        Ok(recovered.energy_error(&self.terms, &zeta, u).relative())
     }
 
     /// ‖field‖ / ‖ζ₀ − ζ‖ in L², by the weights of the vertices; `None` without damage. Collective.
@@ -71,7 +71,7 @@ impl DiscreteProblem {
     pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
         let body = &self.body;
         let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));
-        let energies = self.elasticity.energies(body, &zeta, &state.u);
+        let energies = self.terms.elasticity.energies(body, &zeta, &state.u);
         let own = energies.len() / body.triangles.len() * body.own_triangles;
         let mut sums = [0.0; 2];
         for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {

@@ -1,12 +1,12 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
 use crate::{
-    fem::{Body, Elasticity, Fit, Patches, monomials},
+    fem::{Body, Fit, Patches, Terms, monomials},
     petsc::PetscError,
 };
 use nalgebra::{Matrix6, Matrix6x3, Vector3};
 
-/// An estimate of the error of u in the energy norm, ‖v‖² = ∫ ζ Aε(v) : ε(v).
+/// An estimate of the error of u in the energy norm, ‖v‖² = vᵀKv. The error is that of the strains.
 #[derive(Debug, Clone)]
 pub struct EnergyError {
     /// ‖ε* − ε(u)‖² on each triangle that belongs to this rank, N m per metre of thickness.
@@ -56,7 +56,7 @@ impl<'a> RecoveredStrains<'a> {
     }
 
     /// Estimates the error of u in the energy norm; `zeta` is ζ at the quadrature points. Collective.
-    pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
+    pub fn energy_error(&self, terms: &Terms, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
         let square = |t: usize| {
             let own = per_triangle * t..per_triangle * (t + 1);
@@ -65,12 +65,10 @@ impl<'a> RecoveredStrains<'a> {
             let difference = self.difference(t).map(|strain| strain.transpose());
             let difference = Matrix6x3::from_rows(&difference);
             let products = difference.transpose() * mass() * difference;
-            mean * body.triangles[t].area() * elasticity.d(body, t).dot(&products)
+            mean * body.triangles[t].area() * terms.elasticity.d(body, t).dot(&products)
         };
         let squares: Vec<f64> = (0..body.own_triangles).map(square).collect();
-        let points = per_triangle * body.own_triangles;
-        let energy: f64 = elasticity.energies(body, zeta, u).iter().take(points).sum();
-        let mut sums = [squares.iter().sum(), energy];
+        let mut sums = [squares.iter().sum(), terms.energy(body, zeta, u)];
         body.nodes.partition.comm().sum(&mut sums);
         EnergyError { squares, error: sums[0], energy: sums[1] }
     }

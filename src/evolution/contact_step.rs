@@ -114,7 +114,7 @@ impl<'a> ContactStep<'a> {
         let (body, constraints) = (&problem.body, &problem.constraints);
         let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
         let stiffness = phases.time("stiffness pattern", || {
-            Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
+            Stiffness::new(session, body, &problem.terms, &constraints.bases)
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
@@ -169,7 +169,7 @@ impl<'a> ContactStep<'a> {
         if comm.any(zeta_at_points != self.zeta_at_points) {
             let bytes = self.stiffness.bytes();
             phases.time_moving("stiffness", (1.0, bytes), || {
-                self.stiffness.set_damage(&problem.body, &problem.elasticity, &zeta_at_points)
+                self.stiffness.set_damage(&problem.body, &zeta_at_points)
             });
             self.zeta_at_points = zeta_at_points;
         }

@@ -32,7 +32,12 @@ macro_rules! for_elements {
 }
 pub(crate) use for_elements;
 
-impl<const N: usize, const Q: usize> Cells<'_, N, Q> {
+impl<'a, const N: usize, const Q: usize> Cells<'a, N, Q> {
+    /// N and the nodes of all elements, N in turn for each.
+    pub(super) fn flat_nodes(self) -> (usize, &'a [usize]) {
+        (N, self.nodes.as_flattened())
+    }
+
     /// The displacements of the nodes of element `t`.
     #[inline(always)]
     pub fn gather(&self, t: usize, u: &[f64]) -> [[f64; 2]; N] {

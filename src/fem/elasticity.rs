@@ -1,10 +1,14 @@
-//! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) without a matrix, for certificates.
+//! The damaged elasticity (ζ Aε(u), ε(v)) of (26): strains and stresses, and the term of K.
 
-use super::{Body, Element, for_elements};
+use super::{
+    Body, Element, for_elements,
+    stiffness::Groups,
+    terms::{ElementSums, Term},
+};
 use crate::model::Material;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Strains, stresses and internal forces of a displacement field, triangle by triangle.
+/// Stresses, internal forces and energies of a displacement field, triangle by triangle.
 #[derive(Debug, Clone)]
 pub struct Elasticity {
     /// The materials by their numbers, and A of each as the matrix D of [`Material::stiffness`], Pa.
@@ -14,7 +18,7 @@ pub struct Elasticity {
 impl Elasticity {
     /// The operator of undamaged `materials`, at least one, as they are numbered in
     /// [`Body::materials`].
-    pub fn new(materials: impl IntoIterator<Item = Material>) -> Self {
+    pub(super) fn new(materials: impl IntoIterator<Item = Material>) -> Self {
         Self { materials: materials.into_iter().map(|m| (m, m.stiffness())).collect() }
     }
 
@@ -38,16 +42,13 @@ impl Elasticity {
     /// quadrature points q.
     pub fn stresses(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<Vector3<f64>> {
         for_elements!(body, cells => {
-            let points = cells.elements[0].points.len();
-            let stresses = cells.strains(u, |t, strain| self.d(body, t) * strain);
-            let stresses: Vec<_> = stresses.iter().zip(zeta).map(|(s, zeta)| s * *zeta).collect();
-            let triangles = stresses.chunks(points).zip(cells.elements);
-            let mean = |(stresses, element): (&[Vector3<f64>], &Element<_, _>)| {
-                let weights = element.points.iter().map(|point| point.weight);
-                let sum: Vector3<f64> = stresses.iter().zip(weights.clone()).map(|(s, w)| w * s).sum();
-                sum / weights.sum::<f64>()
+            let mean = |(t, element): (usize, &Element<_, _>)| {
+                let (local, points) = (cells.gather(t, u), &element.points);
+                let parts = points.iter().zip(&zeta[points.len() * t..]);
+                let parts = parts.map(|(point, zeta)| point.weight * zeta * point.strain(&local));
+                self.d(body, t) * parts.sum::<Vector3<f64>>() / element.area()
             };
-            triangles.map(mean).collect()
+            cells.elements.iter().enumerate().map(mean).collect()
         })
     }
 
@@ -80,16 +81,23 @@ impl Elasticity {
             points.map(|((density, point), zeta)| point.weight * zeta * density).collect()
         })
     }
+}
 
-    /// The internal forces F_i = ∫ ζ Aε(u) : ε(φ_i) of nodal u, N per metre of thickness, with
-    /// `zeta` the values of ζ at the quadrature points ([`Body::at_points`]).
-    pub fn internal_force(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
+impl Term for Elasticity {
+    fn nodes<'a>(&'a self, body: &'a Body) -> (usize, &'a [usize]) {
+        for_elements!(body, cells => cells.flat_nodes())
+    }
+
+    fn sums(&self, body: &Body) -> Box<dyn ElementSums> {
+        for_elements!(body, cells => Box::new(Groups::new(self, cells)))
+    }
+
+    fn add_force(&self, body: &Body, zeta: &[f64], u: &[f64], force: &mut [f64]) {
         for_elements!(body, cells => {
-            let mut force = vec![0.0; u.len()];
             let mut zeta = zeta.iter();
             for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
                 let (local, d) = (cells.gather(t, u), self.d(body, t));
-                let mut sums = cells.gather(t, &force);
+                let mut sums = cells.gather(t, force);
                 for (point, zeta) in element.points.iter().zip(&mut zeta) {
                     let stress = d * point.strain(&local) * *zeta;
                     for (sum, [fx, fy]) in sums.iter_mut().zip(point.force(&stress)) {
@@ -100,16 +108,11 @@ impl Elasticity {
                     (force[2 * node], force[2 * node + 1]) = (fx, fy);
                 }
             }
-            force
-        })
+        });
     }
 
-    /// The rounding error of the internal forces of u: at each node ε_machine Σ ζ |K_T||u| over the
-    /// quadrature points of its triangles T, N per metre of thickness (Oettli and Prager, Numer. Math. 6,
-    /// 1964).
-    pub fn force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
+    fn add_force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64], rounding: &mut [f64]) {
         for_elements!(body, cells => {
-            let mut rounding = vec![0.0; u.len()];
             let mut zeta = zeta.iter();
             for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
                 let local = cells.gather(t, u).map(|[x, y]| Vector2::new(x.abs(), y.abs()));
@@ -124,7 +127,16 @@ impl Elasticity {
                     }
                 }
             }
-            rounding
-        })
+        });
+    }
+
+    fn energy(&self, body: &Body, zeta: &[f64], u: &[f64]) -> f64 {
+        let energies = self.energies(body, zeta, u);
+        let own = energies.len() * body.own_triangles / body.triangles.len().max(1);
+        energies[..own].iter().sum()
+    }
+
+    fn resists(&self) -> Vec<(usize, [f64; 2])> {
+        Vec::new()
     }
 }

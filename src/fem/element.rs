@@ -95,25 +95,6 @@ impl<const N: usize, const Q: usize> Element<N, Q> {
     pub fn area(&self) -> f64 {
         self.points.iter().map(|point| point.weight).sum()
     }
-
-    /// The 2×2 block K_ij = ∫ ζ Aε(φ_i) : ε(φ_j) of two nodes, N/m per metre of thickness, from the matrix
-    /// D of an isotropic A and ζ at the quadrature points: a linear map of Σ_q w_q ζ_q ∇φ_i ∇φ_jᵀ.
-    #[inline(always)]
-    pub fn stiffness(&self, d: &Matrix3<f64>, zeta: &[f64; Q], i: usize, j: usize) -> Matrix2<f64> {
-        let [mut xx, mut xy, mut yx, mut yy] = [0.0; 4];
-        for (point, zeta) in self.points.iter().zip(zeta) {
-            let ([x, y], [p, q]) = (point.gradients[i], point.gradients[j]);
-            let (x, y) = (point.weight * zeta * x, point.weight * zeta * y);
-            (xx, xy, yx, yy) = (xx + x * p, xy + x * q, yx + y * p, yy + y * q);
-        }
-        let (along, across, shear) = (d[(0, 0)], d[(0, 1)], d[(2, 2)]);
-        Matrix2::new(
-            along * xx + shear * yy,
-            across * xy + shear * yx,
-            across * yx + shear * xy,
-            along * yy + shear * xx,
-        )
-    }
 }
 
 impl<const N: usize> QuadraturePoint<N> {

@@ -1,7 +1,8 @@
 //! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors.
 //!
 //! - [`Body`]: the nodes and elements of a mesh, and their division among ranks ([`Partition`], `Subdomain`);
-//! - [`Elasticity`]: strains, stresses and internal forces; [`Stiffness`]: K(ζ), by elements or by entries;
+//! - [`Terms`]: the terms of K, each with its forces and its energy, as [`Elasticity`], which also has stresses;
+//! - [`Stiffness`]: K(ζ) for solvers, by elements or by entries;
 //! - [`DamageSystem`] solves (28), and [`DamageCertificate`] checks the answer without its matrices.
 //!
 //! What crosses the door: fields as plain slices over the nodes of this rank's subdomain, owned ones first, then
@@ -15,6 +16,7 @@ mod cells;
 mod body;
 mod subdomain;
 mod nodal_bases;
+mod terms;
 mod elasticity;
 mod stiffness;
 mod rigid_motion;
@@ -41,4 +43,5 @@ pub(crate) use patches::{Fit, Patches, monomials};
 pub use rigid_motion::{RigidMotion, resultant};
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;
+pub use terms::Terms;
 pub use triangle::Triangle;

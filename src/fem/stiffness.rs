@@ -1,15 +1,17 @@
-//! The damaged elastic operator (ζ Aε(u), ε(v)) of (26) for solvers: products by elements, entries for factors.
+//! The operator K of (26) for solvers: products by elements, entries for factors.
 
 mod groups;
 
-use super::{Body, Cells, Elasticity, Elements, NodalBases, Nodes, for_elements};
+use super::{
+    Body, NodalBases, Nodes, Terms,
+    terms::{ElementSums, Term},
+};
 use crate::petsc::{Matrix, Operator, Pattern, PetscError, Session, Vector};
-use groups::{ElementSums, Groups};
+pub(super) use groups::Groups;
 use nalgebra::Matrix2;
 use std::{cell::RefCell, iter::zip, rc::Rc};
 
-/// The stiffness matrix K_ij = Σ_q w_q ζ_q Aε(φ_i) : ε(φ_j) over the quadrature points q of the
-/// elements, in the unknowns of [`NodalBases`].
+/// The stiffness matrix K, the sum of its [`Terms`], in the unknowns of [`NodalBases`].
 ///
 /// Products and the diagonal are sums over the elements. The entries are written where they are read: for
 /// factors and for preconditioners of PETSc.
@@ -23,14 +25,13 @@ pub struct Stiffness {
 
 /// K in the unknowns of nodal bases, from the elements.
 struct ElementOperator {
-    sums: Box<dyn ElementSums>,
+    /// The terms of K. Each has per element and pair of its nodes (i, j) the places of both rows of K_ij among the
+    /// stored entries: `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
+    terms: Vec<(Box<dyn ElementSums>, Vec<[u32; 2]>)>,
     nodes: Rc<Nodes>,
     bases: NodalBases,
     /// The diagonal entry of fixed unknowns.
     scale: f64,
-    /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
-    /// `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
-    places: Vec<[u32; 2]>,
     /// The places of the entries in rows or columns of fixed unknowns. Is the entry on the diagonal?
     fixed: Vec<(u32, bool)>,
 }
@@ -41,14 +42,14 @@ const NOT_STORED: [u32; 2] = [u32::MAX; 2];
 const BLOCK_ENTRIES: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
 impl Stiffness {
-    /// Elements and pattern; the values are those of the undamaged body.
+    /// The elements of all terms and their pattern; the values are those of the undamaged body.
     ///
     /// # Errors
     /// PETSc failed.
     pub fn new(
         session: &Session,
         body: &Body,
-        elasticity: &Elasticity,
+        terms: &Terms,
         bases: &NodalBases,
     ) -> Result<Self, PetscError> {
         let (partition, fixed) = (&body.nodes.partition, bases.fixed());
@@ -56,10 +57,9 @@ impl Stiffness {
         let is_stored =
             |a: usize, b: usize| a < partition.owned() && (a == b || !is_fixed(a) && !is_fixed(b));
         let column = |node: usize| partition.global(node, 1, 0);
-        let pattern = for_elements!(body, cells => {
-            let stored = couples(&cells).filter(|&(a, b)| is_stored(a, b));
-            Pattern::new(partition.owned(), stored.map(|(a, b)| (a, column(b))))
-        });
+        let all = terms.all().flat_map(|term| couples(term.nodes(body)));
+        let stored = all.filter(|&(a, b)| is_stored(a, b)).map(|(a, b)| (a, column(b)));
+        let pattern = Pattern::new(partition.owned(), stored);
         let (mut matrix, entries) = Matrix::with_places(session, 2, &pattern.of_blocks())?;
         matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
 
@@ -68,34 +68,33 @@ impl Stiffness {
             let rows = |position| pattern.rows_of_block(a, position).map(|row| entries[row]);
             position.map_or(NOT_STORED, rows)
         };
-        let (mut places, mut of_fixed) = (Vec::new(), Vec::new());
-        for_elements!(body, cells => for (a, b) in couples(&cells) {
+        let mut of_fixed = Vec::new();
+        let mut place = |(a, b)| {
             let rows = place((a, b));
-            places.push(rows);
             for [i, j] in BLOCK_ENTRIES.into_iter().filter(|_| rows != NOT_STORED) {
                 if fixed[2 * a + i] || fixed[2 * b + j] {
                     of_fixed.push((rows[i] + j as u32, a == b && i == j));
                 }
             }
-        });
+            rows
+        };
+        let of_term = |term: &dyn Term| {
+            (term.sums(body), couples(term.nodes(body)).map(&mut place).collect())
+        };
+        let of_terms = terms.all().map(of_term).collect();
         of_fixed.sort_unstable();
         of_fixed.dedup();
 
         let mut operator = ElementOperator {
-            sums: match body.elements() {
-                Elements::Linear(cells) => Box::new(Groups::new(cells)),
-                Elements::Quadratic(cells) => Box::new(Groups::new(cells)),
-            },
+            terms: of_terms,
             nodes: Rc::clone(&body.nodes),
             bases: bases.clone(),
             scale: 0.0,
-            places,
             fixed: of_fixed,
         };
-        let sound = body.at_points(&vec![1.0; body.mesh.nodes.len()]);
-        operator.sums.set(body, elasticity, &sound);
+        operator.set_damage(body, &body.at_points(&vec![1.0; body.mesh.nodes.len()]));
         operator.scale = operator.mean_diagonal().unwrap_or_else(|| {
-            elasticity.materials().map(|material| material.young).fold(0.0, f64::max)
+            terms.elasticity.materials().map(|material| material.young).fold(0.0, f64::max)
         });
         let (scale, operator) = (operator.scale, Rc::new(RefCell::new(operator)));
         matrix.set_operator(Rc::clone(&operator) as Rc<dyn Operator>)?;
@@ -109,17 +108,21 @@ impl Stiffness {
 
     /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains
     /// are constant, this is exact.) All else as it was made of.
-    pub fn set_damage(&mut self, body: &Body, elasticity: &Elasticity, zeta: &[f64]) {
-        self.operator.borrow_mut().sums.set(body, elasticity, zeta);
+    pub fn set_damage(&mut self, body: &Body, zeta: &[f64]) {
+        self.operator.borrow_mut().set_damage(body, zeta);
         self.matrix.set_changed();
     }
 }
 
 impl ElementOperator {
+    fn set_damage(&mut self, body: &Body, zeta: &[f64]) {
+        self.terms.iter_mut().for_each(|(sums, _)| sums.set(body, zeta));
+    }
+
     /// The diagonal entries of the owned unknowns; D⁻ᵀ K_ii D⁻¹ with the bases D.
     fn diagonal(&self) -> Vec<f64> {
         let mut blocks = vec![[0.0; 3]; self.nodes.points.len()];
-        self.sums.add_diagonal(&mut blocks);
+        self.terms.iter().for_each(|(sums, _)| sums.add_diagonal(&mut blocks));
         let of_node = |(node, [xx, xy, yy]): (usize, [f64; 3])| match self.bases.inverse(node) {
             None => [xx, yy],
             Some(inverse) => {
@@ -146,13 +149,13 @@ impl ElementOperator {
 
 impl Operator for RefCell<ElementOperator> {
     fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError> {
-        let ElementOperator { sums, nodes, bases, scale, .. } = &*self.borrow();
+        let ElementOperator { terms, nodes, bases, scale, .. } = &*self.borrow();
         let mut u = x.to_vec();
         bases.zero_fixed(&mut u);
         let mut u = nodes.partition.field(u, 2)?;
         bases.displacement_to_global(&mut u);
         let mut force = vec![0.0; u.len()];
-        sums.add_forces(&u, &mut force);
+        terms.iter().for_each(|(sums, _)| sums.add_forces(&u, &mut force));
         bases.force_to_local(&mut force);
         y.copy_from_slice(&force[..y.len()]);
         let fixed = zip(zip(y, x), bases.fixed()).filter(|(_, fixed)| **fixed);
@@ -165,24 +168,27 @@ impl Operator for RefCell<ElementOperator> {
     }
 
     fn write(&self, entries: &mut [f64]) {
-        let ElementOperator { sums, bases, scale, places, fixed, .. } = &*self.borrow();
-        sums.for_blocks(&mut |[upper, lower], nodes, mut block| {
-            let [of_i, of_j] = nodes.map(|node| bases.inverse(node));
-            block = of_i.map_or(block, |inverse| inverse.transpose() * block);
-            block = of_j.map_or(block, |inverse| block * inverse);
-            add(entries, places[upper], &block);
-            if upper != lower {
-                add(entries, places[lower], &block.transpose());
-            }
-        });
+        let ElementOperator { terms, bases, scale, fixed, .. } = &*self.borrow();
+        for (sums, places) in terms {
+            sums.for_blocks(&mut |[upper, lower], nodes, mut block| {
+                let [of_i, of_j] = nodes.map(|node| bases.inverse(node));
+                block = of_i.map_or(block, |inverse| inverse.transpose() * block);
+                block = of_j.map_or(block, |inverse| block * inverse);
+                add(entries, places[upper], &block);
+                if upper != lower {
+                    add(entries, places[lower], &block.transpose());
+                }
+            });
+        }
         fixed.iter().for_each(|&(place, on_diagonal)| {
             entries[place as usize] = if on_diagonal { *scale } else { 0.0 };
         });
     }
 
     fn bytes(&self) -> f64 {
-        let ElementOperator { sums, nodes, .. } = &*self.borrow();
-        (sums.bytes() + 4 * size_of_val(&nodes.points[..])) as f64
+        let ElementOperator { terms, nodes, .. } = &*self.borrow();
+        (terms.iter().map(|(sums, _)| sums.bytes()).sum::<usize>()
+            + 4 * size_of_val(&nodes.points[..])) as f64
     }
 }
 
@@ -217,9 +223,8 @@ fn rigid_motions(
     motions.into_iter().map(vector).collect()
 }
 
-/// The pairs of nodes (a, b) of each element.
-fn couples<const N: usize, const Q: usize>(
-    cells: &Cells<N, Q>,
-) -> impl Iterator<Item = (usize, usize)> + Clone {
-    cells.nodes.iter().flat_map(|nodes| nodes.iter().flat_map(|a| nodes.map(|b| (*a, b))))
+/// The pairs of nodes (a, b) of each element, from the nodes of all elements, `count` in turn for each.
+fn couples((count, nodes): (usize, &[usize])) -> impl Iterator<Item = (usize, usize)> + Clone {
+    let elements = nodes.chunks_exact(count);
+    elements.flat_map(|of| of.iter().flat_map(move |&a| of.iter().map(move |&b| (a, b))))
 }

@@ -3,7 +3,7 @@
 use crate::{
     ROUNDING,
     contact::{NodalConstraint, RigidMotions},
-    fem::{Body, Edge, normal_error},
+    fem::{Body, Edge, Terms, normal_error},
     mesh::{BoundaryFace, BoundaryNode, Lines, boundary_nodes, extent, joined_faces},
     scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
 };
@@ -104,8 +104,8 @@ impl BoundaryConditions {
 
     /// Finds the rigid motions that the conditions do not prevent. If the normal of an axis or a gap is orthogonal
     /// to a free motion up to rounding, it becomes exactly orthogonal.
-    pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
-        let motions = RigidMotions::new(body, &self.rows, &self.normal_errors);
+    pub(super) fn resolve_motions(&mut self, body: &Body, terms: &Terms) -> RigidMotions {
+        let motions = RigidMotions::new(body, terms, &self.rows, &self.normal_errors);
         let rows = self.rows.iter_mut().zip(&self.values);
         for (row, _) in rows.filter(|(row, value)| row.is_gap() || value.of.is_empty()) {
             row.direction =

@@ -53,7 +53,7 @@ pub(crate) use unresolved::unresolved;
 
 use crate::{
     contact::{Certificate, Constraints, RigidMotions},
-    fem::{Body, Elasticity, Mass, Subdomain},
+    fem::{Body, Mass, Subdomain, Terms},
     mesh::{Lines, Mesh},
     model::DamageLaw,
     petsc::{PetscError, Session},
@@ -71,8 +71,8 @@ use std::{
 pub struct DiscreteProblem {
     /// The body.
     pub body: Body,
-    /// The undamaged elastic operator.
-    pub elasticity: Elasticity,
+    /// The terms of K.
+    pub terms: Terms,
     /// The damage law of each material, by its number; empty if the damage does not evolve.
     laws: Vec<DamageLaw>,
     /// Displacement conditions as unknowns and bounds, for the solvers.
@@ -117,7 +117,8 @@ impl DiscreteProblem {
         let lines = Lines::boundary(&body.mesh);
         body.near_jumps = near_jumps(&scene, &body.mesh, &lines);
         let mut conditions = BoundaryConditions::new(&scene, &body, &lines);
-        let motions = conditions.resolve_motions(&body);
+        let terms = Terms::new(scene.materials());
+        let motions = conditions.resolve_motions(&body, &terms);
         let loads = Loads::new(&body, &scene, &mut conditions);
         let (points, values) = (&body.nodes.points, loads.values_at(scene.start()));
         let mut constraints =
@@ -133,7 +134,7 @@ impl DiscreteProblem {
         let mut problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
-            elasticity: Elasticity::new(scene.materials()),
+            terms,
             laws: if scene.time.is_some() { scene.damage_laws() } else { Vec::new() },
             constraints,
             motions,
@@ -163,6 +164,7 @@ impl DiscreteProblem {
         let Some(owners) = Subdomain::owners(session, &self.body.mesh)? else { return Ok(self) };
         let subdomain = Subdomain::new(session, &self.body, &owners)?;
         Ok(Self {
+            terms: self.terms.restrict(&subdomain),
             constraints: self.constraints.restrict(&subdomain),
             certificate: self.certificate.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),

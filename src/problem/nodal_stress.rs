@@ -74,7 +74,7 @@ impl NodalStress {
                 }
             }
         }
-        let materials = problem.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
+        let materials = problem.terms.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
         Self { patches: Patches::new(body), points, cells, materials }
     }
 

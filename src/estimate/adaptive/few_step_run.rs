@@ -192,7 +192,7 @@ impl History {
         let state = &problem.strained(state);
         let strains = NodalStress::strained(problem, state).strains;
         let recovered = RecoveredStrains::on(&problem.nodal_stress().patches, body, strains)?;
-        let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
+        let error = recovered.energy_error(&problem.terms, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
         self.end = (squares, error.error, error.energy);

@@ -128,7 +128,7 @@ impl FixedContact<'_> {
             return Ok(0.0);
         }
         let zeta = problem.zeta_at_points(&state.zeta);
-        let internal = problem.elasticity.internal_force(&problem.body, &zeta, &state.u);
+        let internal = problem.terms.internal_force(&problem.body, &zeta, &state.u);
         let mut residual = problem.motions.balanced(&problem.body, problem.load(state.time));
         residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
         self.set(&state.zeta, &state.contact);
@@ -139,12 +139,12 @@ impl FixedContact<'_> {
 
     /// Sets the nodal damage and the active nodes of a state. Collective.
     fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) {
-        let DiscreteProblem { body, elasticity, constraints, .. } = self.problem;
+        let DiscreteProblem { body, constraints, .. } = self.problem;
         let flags = active_bounds(constraints, contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         self.active = active.map(|(bound, _)| bound.dof).collect();
         let zeta = self.problem.zeta_at_points(zeta);
-        self.stiffness.set_damage(body, elasticity, &zeta);
+        self.stiffness.set_damage(body, &zeta);
     }
 
     /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or

@@ -1,6 +1,6 @@
-//! The sums over elements that K(ζ) consists of, for eight elements at a time in the lanes of the processor.
+//! The sums over the elements of the elasticity, for eight elements at a time in the lanes of the processor.
 
-use crate::fem::{Body, Cells, Elasticity, Element};
+use crate::fem::{Body, Cells, Elasticity, Element, terms::ElementSums};
 use nalgebra::Matrix2;
 use std::{array::from_fn, iter::zip};
 use wide::f64x8;
@@ -8,32 +8,14 @@ use wide::f64x8;
 /// Elements of a group.
 pub(super) const LANES: usize = 8;
 
-/// Sums over the elements of a body, in displacements without nodal bases. For an isotropic A with the Lamé
-/// constants λ = D_12 and μ = D_33, a quadrature point q of weight w contributes the stress
+/// The elements of a body, [`LANES`] in a group. For an isotropic A with the Lamé constants λ = D_12 and μ = D_33, a
+/// quadrature point q of weight w contributes the stress
 ///
 /// ```text
 /// w σ = w ζ_q (λ tr ε I + 2μ ε),   ε = ½(∇u + ∇uᵀ).
 /// ```
-pub(super) trait ElementSums {
-    /// Takes ζ at the quadrature points.
-    fn set(&mut self, body: &Body, elasticity: &Elasticity, zeta: &[f64]);
-
-    /// Adds the internal forces of `u` to `force`.
-    fn add_forces(&self, u: &[f64], force: &mut [f64]);
-
-    /// Adds K_xx, K_xy and K_yy of each node with itself.
-    fn add_diagonal(&self, diagonal: &mut [[f64; 3]]);
-
-    /// Calls `add` for the pairs of nodes (i, j), j ≤ i, of every element: the numbers of (i, j) and of (j, i) among
-    /// all pairs, the nodes, and K_ij.
-    fn for_blocks(&self, add: &mut dyn FnMut([usize; 2], [usize; 2], Matrix2<f64>));
-
-    /// The memory of these data, bytes.
-    fn bytes(&self) -> usize;
-}
-
-/// The elements of a body, [`LANES`] in a group.
-pub(super) struct Groups<const N: usize, const Q: usize> {
+pub(crate) struct Groups<const N: usize, const Q: usize> {
+    elasticity: Elasticity,
     groups: Vec<Group<N, Q>>,
     elements: usize,
 }
@@ -54,7 +36,7 @@ struct Point<const N: usize> {
 
 impl<const N: usize, const Q: usize> Groups<N, Q> {
     /// The elements, with ζ = 0.
-    pub(super) fn new(cells: Cells<N, Q>) -> Self {
+    pub(crate) fn new(elasticity: &Elasticity, cells: Cells<N, Q>) -> Self {
         let group = |(nodes, elements): (&[[usize; N]], &[Element<N, Q>])| Group {
             nodes: from_fn(|i| from_fn(|lane| nodes.get(lane).map_or(0, |nodes| nodes[i] as u32))),
             points: from_fn(|q| {
@@ -72,18 +54,22 @@ impl<const N: usize, const Q: usize> Groups<N, Q> {
             }),
         };
         let groups = zip(cells.nodes.chunks(LANES), cells.elements.chunks(LANES)).map(group);
-        Self { groups: groups.collect(), elements: cells.elements.len() }
+        Self {
+            elasticity: elasticity.clone(),
+            groups: groups.collect(),
+            elements: cells.elements.len(),
+        }
     }
 }
 
 impl<const N: usize, const Q: usize> ElementSums for Groups<N, Q> {
-    fn set(&mut self, body: &Body, elasticity: &Elasticity, zeta: &[f64]) {
+    fn set(&mut self, body: &Body, zeta: &[f64]) {
         let zeta = zeta.as_chunks::<Q>().0.chunks(LANES);
         for (g, (group, zeta)) in zip(&mut self.groups, zeta).enumerate() {
             for (q, point) in group.points.iter_mut().enumerate() {
                 let [mut lambda, mut mu] = [[0.0; LANES]; 2];
                 for (lane, zeta) in zeta.iter().enumerate() {
-                    let d = elasticity.d(body, LANES * g + lane);
+                    let d = self.elasticity.d(body, LANES * g + lane);
                     (lambda[lane], mu[lane]) = (zeta[q] * d[(0, 1)], zeta[q] * d[(2, 2)]);
                 }
                 point.lambda = point.weight * f64x8::from(lambda);

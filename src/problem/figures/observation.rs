@@ -63,8 +63,9 @@ impl Observation {
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let comm = partition.comm();
         let zeta = problem.zeta_at_points(&state.zeta);
-        let stress =
-            |t: usize, at: [f64; 3]| problem.elasticity.stress_at(body, (t, at), &zeta, &state.u);
+        let stress = |t: usize, at: [f64; 3]| {
+            problem.terms.elasticity.stress_at(body, (t, at), &zeta, &state.u)
+        };
         let contact = (&state.contact[..], state.time);
         let mut resultants = problem.supports.resultants(body, unbalanced, contact, stress);
         comm.sum(resultants.as_flattened_mut());
