@@ -8,7 +8,7 @@ use signorini::{
     model::{Material, Plane},
     output::terminal::{self, plain, say},
     problem::{Collapse, DiscreteProblem},
-    scene::{Boundary, Condition, Scene, Stepping, SurfaceLoad, Units, rounded},
+    scene::{Boundary, Condition, Scene, Stepping, Units, rounded},
 };
 use std::iter::once;
 
@@ -114,12 +114,8 @@ fn conditions(
     unit: &str,
 ) -> String {
     let in_words = |condition: &Condition| match condition {
-        Condition::Displacement([Some(_), Some(_)]) => "displacement".to_owned(),
-        Condition::Displacement([Some(_), None]) => "displacement in x".to_owned(),
-        Condition::Displacement(_) => "displacement in y".to_owned(),
-        Condition::Symmetry => "symmetry".to_owned(),
-        Condition::Load(SurfaceLoad::Traction(_)) => "traction".to_owned(),
-        Condition::Load(SurfaceLoad::Pressure(_)) => "pressure".to_owned(),
+        Condition::Displacement([_, None]) => "displacement in x".to_owned(),
+        Condition::Displacement([None, _]) => "displacement in y".to_owned(),
         Condition::Gap(gap) => {
             let at = |node: &usize| {
                 let [x, y] = mesh.nodes[*node];
@@ -133,6 +129,7 @@ fn conditions(
             let along = if gap.normal.is_some() { " along its own normal" } else { "" };
             format!("gap from {} to {} {unit}{along}", plain(least, 5), plain(most, 5))
         }
+        other => other.name().to_owned(),
     };
     boundary.conditions.iter().map(in_words).collect::<Vec<_>>().join(", ")
 }

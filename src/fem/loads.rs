@@ -1,10 +1,11 @@
 //! Nodal loads of body forces and tractions, (f, w)_V of the paper.
 
 use super::{
-    Body, Edge, Elements,
+    Body, Cells, Edge, Elements,
     edge::THREE_GAUSS,
     element::{POINTS, quadratic_measure, quadratic_values},
 };
+use crate::mesh::twice_area;
 use nalgebra::Matrix3;
 use rustc_hash::FxHashMap as HashMap;
 
@@ -36,75 +37,53 @@ pub fn add_body_force(
     force: impl Fn(usize, [f64; 2]) -> [f64; 2],
     load: &mut [f64],
 ) {
-    let points = &body.nodes.points;
-    let parts = |t: usize| parts_of_triangles.get(&body.global_triangles[t]);
-    let mut add = |node: usize, weight: f64, f: [f64; 2]| {
-        load[2 * node] += weight * f[0];
-        load[2 * node + 1] += weight * f[1];
-    };
+    /// The midpoints of the sides.
+    const MIDPOINTS: [[f64; 3]; 3] = [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]];
+    let parts = |t: usize| parts_of_triangles.get(&body.global_triangles[t]).map(Vec::as_slice);
     match body.elements() {
         Elements::Linear(cells) => {
-            for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
-                if let Some(parts) = parts(t) {
-                    let corners = nodes.map(|node| points[node]);
-                    let twice = |_| 2.0 * element.area();
-                    in_parts(
-                        parts,
-                        corners,
-                        |l| l,
-                        twice,
-                        |x| force(t, x),
-                        |i, w, f| add(nodes[i], w, f),
-                    );
-                    continue;
-                }
-                for side in 0..3 {
-                    let (a, b) = (nodes[side], nodes[(side + 1) % 3]);
-                    let f = force(t, midpoint(points[a], points[b]));
-                    // At the midpoint of a side the functions of its ends are ½, and the third one is 0.
-                    [a, b].into_iter().for_each(|node| add(node, element.area() / 6.0, f));
-                }
-            }
+            let twice_area = |&[a, b, c]: &[[f64; 2]; 3], _: [f64; 3]| twice_area(a, b, c);
+            let rule = (MIDPOINTS, |l| l, twice_area);
+            integrate(&cells, &body.nodes.points, parts, rule, force, load);
         }
         Elements::Quadratic(cells) => {
-            let values = POINTS.map(quadratic_values);
-            for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
-                let x = nodes.map(|node| points[node]);
-                if let Some(parts) = parts(t) {
-                    let twice = |l| quadratic_measure(&x, l);
-                    let add = |i: usize, w, f| add(nodes[i], w, f);
-                    in_parts(parts, x, quadratic_values, twice, |x| force(t, x), add);
-                    continue;
-                }
-                for (point, values) in element.points.iter().zip(&values) {
-                    let f = force(t, weighted(&x, values));
-                    nodes
-                        .iter()
-                        .zip(values)
-                        .for_each(|(&n, value)| add(n, point.weight * value, f));
-                }
-            }
+            let rule = (POINTS, quadratic_values, quadratic_measure);
+            integrate(&cells, &body.nodes.points, parts, rule, force, load);
         }
     }
 }
 
-/// Adds ∫ f φ_i over the parts of an element with these nodes and functions φ_i, and `twice` the area per
-/// reference area, all by barycentric coordinates.
-fn in_parts<const N: usize>(
-    parts: &[[[f64; 3]; 3]],
-    nodes: [[f64; 2]; N],
-    functions: impl Fn([f64; 3]) -> [f64; N],
-    twice: impl Fn([f64; 3]) -> f64,
-    force: impl Fn([f64; 2]) -> [f64; 2],
-    mut add: impl FnMut(usize, f64, [f64; 2]),
+/// Adds ∫ f φ_i over the elements to `load`, with the integration points of undivided triangles, the functions φ_i and
+/// twice the area per reference area, all by barycentric coordinates.
+fn integrate<'a, const N: usize, const Q: usize>(
+    cells: &Cells<N, Q>,
+    points: &[[f64; 2]],
+    parts: impl Fn(usize) -> Option<&'a [[[f64; 3]; 3]]>,
+    (of_whole, functions, twice_area): (
+        [[f64; 3]; 3],
+        impl Fn([f64; 3]) -> [f64; N],
+        impl Fn(&[[f64; 2]; N], [f64; 3]) -> f64,
+    ),
+    force: impl Fn(usize, [f64; 2]) -> [f64; 2],
+    load: &mut [f64],
 ) {
-    for part in parts {
-        let share = Matrix3::from(*part).determinant().abs() / 6.0;
-        for point in POINTS.map(|point| part_point(part, point)) {
+    for (t, nodes) in cells.nodes.iter().enumerate() {
+        let corners = nodes.map(|node| points[node]);
+        let mut add = |weight: f64, point: [f64; 3]| {
             let values = functions(point);
-            let f = force(weighted(&nodes, &values));
-            let weight = share * twice(point);
-            (0..N).for_each(|i| add(i, weight * values[i], f));
+            let f = force(t, weighted(&corners, &values));
+            let weight = weight / 6.0 * twice_area(&corners, point);
+            for (node, value) in nodes.iter().zip(values) {
+                load[2 * node] += weight * value * f[0];
+                load[2 * node + 1] += weight * value * f[1];
+            }
+        };
+        match parts(t) {
+            None => of_whole.into_iter().for_each(|point| add(1.0, point)),
+            Some(parts) => parts.iter().for_each(|part| {
+                let size = Matrix3::from(*part).determinant().abs();
+                POINTS.into_iter().for_each(|point| add(size, part_point(part, point)));
+            }),
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::{
     contact::{NodalConstraint, RigidMotions},
     fem::{Body, Edge, Terms, normal_error},
     mesh::{BoundaryFace, BoundaryNode, Lines, boundary_nodes, extent, joined_faces},
-    scene::{Boundary, Condition, Expression, Gap, Scene, SurfaceLoad},
+    scene::{Condition, Expression, Gap, Scene, SurfaceLoad},
 };
 
 /// The conditions of all boundaries.
@@ -68,38 +68,55 @@ impl BoundaryConditions {
             let edges = body.edges(&curve.edges);
             let follows_mesh = boundary.gap().is_none_or(|gap| gap.normal.is_none());
             let normal_error = if follows_mesh { normal_error(&edges, points, lines) } else { 0.0 };
-            for node in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points, lines))) {
-                conditions.add_fixed_rows(boundary, points, &node);
-                let largest = &mut conditions.normal_errors[node.node];
+            for at in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points, lines))) {
+                let (node, point) = (at.node, points[at.node]);
+                let largest = &mut conditions.normal_errors[node];
                 *largest = largest.max(normal_error);
-                let Some(gap) = boundary.gap() else { continue };
-                let [x, y] = points[node.node];
-                let distance = match gap.distance.eval(x, y, scene.start()) {
-                    _ if gap.distance.depends_on_time() => gap.distance.clone(),
-                    g => Expression::constant(if g.abs() <= rounding { g.max(0.0) } else { g }),
-                };
-                let faces = faces(gap, &node).into_iter();
-                gaps.extend(faces.map(|face| (node.node, face, distance.clone())));
+                let prescribed =
+                    |direction| NodalConstraint { node, direction, tributary_length: None };
+                for condition in &boundary.conditions {
+                    match condition {
+                        Condition::Displacement([x, y]) => {
+                            for (value, axis) in [(x, [1.0, 0.0]), (y, [0.0, 1.0])] {
+                                let values = value.iter().map(|value| vec![value.clone()]);
+                                values.for_each(|of| conditions.add(prescribed(axis), point, of));
+                            }
+                        }
+                        Condition::Symmetry => at.faces.iter().for_each(|face| {
+                            conditions.add(prescribed(face.normal), point, Vec::new());
+                        }),
+                        Condition::Gap(gap) => {
+                            let distance = distance(gap, point, scene.start(), rounding);
+                            let faces = faces(gap, &at).into_iter();
+                            gaps.extend(faces.map(|face| (node, face, distance.clone())));
+                        }
+                        Condition::Load(_) => {}
+                    }
+                }
             }
-            if boundary.conditions.iter().any(|of| !matches!(of, Condition::Load(_))) {
+            let tractions = boundary.loads().cloned();
+            let tractions = tractions.map(|force| Traction { edges: edges.clone(), force });
+            conditions.tractions.extend(tractions);
+            if boundary.is_support() {
                 conditions.supports.push(boundary.name.clone());
             }
-            conditions.tractions.extend(
-                boundary.loads().map(|f| Traction { edges: edges.clone(), force: f.clone() }),
-            );
         }
         for (node, faces) in joined_faces(gaps) {
             for (BoundaryFace { normal: direction, length, .. }, distances) in faces {
                 let row = NodalConstraint { node, direction, tributary_length: Some(length) };
-                conditions.add(row, points, distances);
+                conditions.add(row, points[node], distances);
             }
         }
         conditions
     }
 
-    fn add(&mut self, row: NodalConstraint, points: &[[f64; 2]], of: Vec<Expression>) {
+    /// Adds a condition at a point; if it prescribes a displacement, for the support whose name follows.
+    fn add(&mut self, row: NodalConstraint, point: [f64; 2], of: Vec<Expression>) {
+        if !row.is_gap() {
+            self.prescribed_by.push(self.supports.len());
+        }
         self.rows.push(row);
-        self.values.push(RowValue { point: points[row.node], of });
+        self.values.push(RowValue { point, of });
     }
 
     /// Finds the rigid motions that the conditions do not prevent. If the normal of an axis or a gap is orthogonal
@@ -113,24 +130,13 @@ impl BoundaryConditions {
         }
         motions
     }
+}
 
-    fn add_fixed_rows(&mut self, boundary: &Boundary, points: &[[f64; 2]], at: &BoundaryNode) {
-        let row = |direction| NodalConstraint { node: at.node, direction, tributary_length: None };
-        for condition in &boundary.conditions {
-            if let Condition::Displacement(components) = condition {
-                for (component, direction) in components.iter().zip([[1.0, 0.0], [0.0, 1.0]]) {
-                    let Some(value) = component else { continue };
-                    self.add(row(direction), points, vec![value.clone()]);
-                    self.prescribed_by.push(self.supports.len());
-                }
-            }
-            if let Condition::Symmetry = condition {
-                for face in &at.faces {
-                    self.add(row(face.normal), points, Vec::new());
-                    self.prescribed_by.push(self.supports.len());
-                }
-            }
-        }
+/// The distance of a gap at a point. If it is constant and less than `rounding`, it is zero.
+fn distance(gap: &Gap, [x, y]: [f64; 2], start: f64, rounding: f64) -> Expression {
+    match gap.distance.eval(x, y, start) {
+        _ if gap.distance.depends_on_time() => gap.distance.clone(),
+        g => Expression::constant(if g.abs() <= rounding { g.max(0.0) } else { g }),
     }
 }
 

@@ -24,8 +24,7 @@ pub enum SetupError {
     },
     /// A load, a prescribed displacement or a gap is not finite, and this rank does not know where.
     #[error(
-        "{scene}: a traction, the body force, a prescribed displacement or a gap is not finite or too \
-         large at t = {}; check its expression for divisions by zero, roots and logarithms \
+        "{scene}: the body force or a value of a boundary is not finite or too large at t = {}; check its expression for divisions by zero, roots and logarithms \
          of negative numbers",
         rounded(*time)
     )]

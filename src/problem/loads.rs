@@ -73,10 +73,10 @@ impl Loads {
     /// Notes on loads whose integrals may miss a large part.
     pub(crate) fn notes(&self, times: &[f64]) -> Vec<String> {
         let body = self.body_force.iter();
-        let body = body.map(|force| ("the body force", "triangles", force.missed));
+        let body = body.map(|force| ("body force", "triangles", force.missed));
         let surface = self.surface_forces.iter().map(|force| {
             let missed = times.iter().map(|&t| force.resolved(t).missed).fold(0.0, f64::max);
-            ("a traction or pressure", "edges", missed)
+            (force.force.name(), "edges", missed)
         });
         let note = |(name, elements, missed): (&str, &str, f64)| {
             let part = match missed < 1.0 {
@@ -84,7 +84,7 @@ impl Loads {
                 false => "much of it, or all,".to_owned(),
             };
             format!(
-                "{name} changes too sharply within the mesh's {elements} to be integrated: {part} may be \
+                "the {name} changes too sharply within the mesh's {elements} to be integrated: {part} may be \
                  missed; refine the mesh where it changes"
             )
         };

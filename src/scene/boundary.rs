@@ -1,7 +1,7 @@
 //! The conditions on the parts of the boundary. Some of them exclude each other on the same edge.
 
 use super::expression::Expression;
-use super::schema::{Diagnostic, is_wrong};
+use super::schema::{Diagnostic, is_wrong, keys_of_element};
 use serde::Deserialize;
 use std::array;
 
@@ -34,8 +34,16 @@ impl Condition {
             Self::Displacement(_) => "displacement",
             Self::Symmetry => "symmetry",
             Self::Gap(_) => "gap",
-            Self::Load(SurfaceLoad::Traction(_)) => "traction",
-            Self::Load(SurfaceLoad::Pressure(_)) => "pressure",
+            Self::Load(load) => load.name(),
+        }
+    }
+
+    /// Does it support the body, with a force that is an unknown? It then has its values at nodes, and a load at the
+    /// points that integrate it.
+    pub fn is_support(&self) -> bool {
+        match self {
+            Self::Displacement(_) | Self::Symmetry | Self::Gap(_) => true,
+            Self::Load(_) => false,
         }
     }
 
@@ -60,6 +68,14 @@ pub enum SurfaceLoad {
 }
 
 impl SurfaceLoad {
+    /// Its key in a scene.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Traction(_) => "traction",
+            Self::Pressure(_) => "pressure",
+        }
+    }
+
     /// f_N at a point, m, with the outward normal there, and a time, s.
     pub fn at(&self, [x, y]: [f64; 2], normal: [f64; 2], t: f64) -> [f64; 2] {
         match self {
@@ -90,6 +106,11 @@ pub struct Gap {
 }
 
 impl Boundary {
+    /// Does it support the body?
+    pub fn is_support(&self) -> bool {
+        self.conditions.iter().any(Condition::is_support)
+    }
+
     /// The obstacle, on Γ_C.
     pub fn gap(&self) -> Option<&Gap> {
         self.conditions.iter().find_map(|condition| match condition {
@@ -170,9 +191,9 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
         return Err(("", problem));
     }
     if conditions.is_empty() {
-        let problem = "has nothing in it: give it a displacement, symmetry = true, a traction, a \
-                       pressure or a gap, or remove it";
-        return Err(("", problem.to_owned()));
+        let choices = keys_of_element("boundary").filter(|key| !["name", "normal"].contains(key));
+        let choices = choices.collect::<Vec<_>>().join(", ");
+        return Err(("", format!("has nothing in it: give it one of {choices}, or remove it")));
     }
     Ok(Boundary { name, conditions })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::boundary::{Boundary, Condition, contradiction};
+use super::boundary::{Boundary, contradiction};
 use super::document::{NOWHERE, Problem};
 use super::error::SceneError;
 use super::expression::Expression;
@@ -111,8 +111,7 @@ impl Scene {
             let nodes: Vec<_> = edges().flatten().collect();
             let gauss_points: Vec<_> = edges().flat_map(|[p, q]| gauss_points(p, q)).collect();
             for condition in &boundary.conditions {
-                let is_load = matches!(condition, Condition::Load(_));
-                let points = if is_load { &gauss_points } else { &nodes };
+                let points = if condition.is_support() { &nodes } else { &gauss_points };
                 let key = boundary_key(&boundary.name, condition.name());
                 check(&key, &condition.expressions(), points, finite);
             }

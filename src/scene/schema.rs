@@ -23,6 +23,12 @@ pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
 static ROOT: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
 
+/// The keys of the elements of the list `table`.
+pub(super) fn keys_of_element(table: &str) -> impl Iterator<Item = &'static str> {
+    let keys = ROOT["properties"][table]["items"]["properties"].as_object();
+    keys.into_iter().flatten().map(|(key, _)| &**key)
+}
+
 /// The end of a message about an unknown key: the most similar key, the key with this name `also` in use, or the table
 /// of parameters in which a number may stand.
 fn known_as(schema: &Schema, name: &str, value: &DeValue) -> String {

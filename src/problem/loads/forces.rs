@@ -26,7 +26,7 @@ const MAX_SAMPLES: usize = 500;
 #[derive(Debug)]
 pub(super) struct SurfaceForce {
     /// f_N, N/m².
-    force: SurfaceLoad,
+    pub(super) force: SurfaceLoad,
     /// Its edges in the undivided body: ends and middles, m. All ranks divide them in the same way.
     lines: Vec<[[f64; 2]; 3]>,
     /// The halves of the same edges as parts of a smooth curve.

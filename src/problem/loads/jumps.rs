@@ -3,7 +3,7 @@
 use crate::{
     mesh::{Lines, Mesh, sorted},
     problem::{DiscreteProblem, SEEN, Singular},
-    scene::{Condition, Scene, SurfaceLoad},
+    scene::{Scene, SurfaceLoad},
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -56,10 +56,9 @@ fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usize, [f64; 3]
     // Per edge its loads; `None` if it is supported.
     let mut edges = BTreeMap::<[usize; 2], Option<Vec<&SurfaceLoad>>>::new();
     for boundary in &scene.boundaries {
-        let is_free = boundary.conditions.iter().all(|of| matches!(of, Condition::Load(_)));
         for edge in mesh.curves.get(&boundary.name).iter().flat_map(|curve| &curve.edges) {
             let known = edges.entry(sorted(*edge)).or_insert_with(|| Some(Vec::new()));
-            *known = known.take().filter(|_| is_free);
+            *known = known.take().filter(|_| !boundary.is_support());
             known.iter_mut().for_each(|of| of.extend(boundary.loads()));
         }
     }
