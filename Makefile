@@ -27,7 +27,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate deps-random build mesh run figures test validate random compare \
+.PHONY: help deps deps-validate deps-random build mesh run figures keys test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook \
     constants fuzz clean
 
@@ -39,6 +39,7 @@ help:
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make figures    the figures of every run in out/, again; or ARGS="--animate --format svg"'
+	@echo 'make keys       geo/KEYS.md from the schema of scenes and the figures of the program'
 	@echo 'make test       format, lints, documentation, tests (4 minutes)'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
@@ -85,6 +86,11 @@ figures: deps
 	@set -e; for run in $(patsubst %/summary.json,%,$(wildcard out/*/summary.json)); do \
 	    $(PYTHON) scripts/figures.py $$run $(ARGS); \
 	done
+
+# The build reads the old page, so the new one is written beside it. Its mode stays.
+keys: build
+	@$(PYTHON) scripts/keys.py geo/scene.schema.json $(BINARY) >geo/KEYS.md.new
+	@chmod --reference=geo/KEYS.md geo/KEYS.md.new && mv geo/KEYS.md.new geo/KEYS.md
 
 # `tee` shows the output; the exit code is that of the tests.
 test: deps

@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """Prints the reference of the keys of a scene, geo/KEYS.md, from their JSON schema:
 
-    scripts/keys.py geo/scene.schema.json target/debug/signorini > KEYS.md
+    make keys
 
 The schema has two additional annotations: `values` describes the values and their unit; `absent` describes
 the behaviour without the key if there is no single default. The introduction is scripts/keys.md; the program prints the
 table of the figures."""
 
+import functools
 import json
 import subprocess
 import sys
@@ -36,6 +37,17 @@ def section(title, path, meaning, table):
     if other and is_table(other):
         lines += ["", *section(f"`[{path}NAME]`", f"{path}NAME.", text(other, "description"), other)]
     return lines
+
+
+def resolved(schema, root):
+    """The schema with the keys that it refers to: those of a surface are those of the whole body."""
+    if not isinstance(schema, dict):
+        return schema
+    if "$ref" not in schema:
+        return {name: resolved(value, root) for name, value in schema.items()}
+    _, *path = schema["$ref"].split("/")
+    meaning = f"`{path[1]}.{path[-1]}` in this surface."
+    return {**functools.reduce(dict.__getitem__, path, root), "description": meaning, **schema}
 
 
 def is_table(key):
@@ -68,7 +80,7 @@ def text(key, name):
 
 if __name__ == "__main__":
     schema = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
-    tables = "\n".join(section("At the top of the file", "", "", schema)) + "\n"
+    tables = "\n".join(section("At the top of the file", "", "", resolved(schema, schema))) + "\n"
     page = Path(__file__).with_suffix(".md").read_text(encoding="utf-8")
     figures = subprocess.run([sys.argv[2], "keys", "--figures"], check=True, capture_output=True, text=True).stdout
     print(page.replace(TABLES, tables).replace(FIGURES, figures), end="")

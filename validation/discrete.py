@@ -17,7 +17,7 @@ from signorini_results import derivatives, functions
 from expressions import Expression
 from lagrange import SIDES, Lagrange
 from outline import Outline
-from scene import DAMAGE, direction_of, displacement_order, elasticity, of_material
+from scene import DAMAGE, direction_of, displacement_order, elasticity, must_be_followed, of_material
 
 # Lines at an angle below the first value are one line. Below the second value rounding may decide.
 SAME, ALIKE = 1e-8, 1e-4
@@ -62,6 +62,7 @@ class Discrete:
         self.b[..., 1, 1::2] = self.b[..., 2, 0::2] = gradient[..., 1]
         n = self.elements
         self.dof = np.stack([2 * n, 2 * n + 1], -1).reshape(len(n), -1)
+        must_be_followed(scene)
         self.law = {**DAMAGE, **scene.get("damage", {})}
         self.young, poisson = (of_material(scene, mesh, "material", key) for key in ("young", "poisson"))
         self.density = of_material(scene, mesh, "material", "density", 0.0)

@@ -37,7 +37,9 @@ from petsc4py import PETSc
 import shared  # noqa: F401
 from expressions import Expression
 from lagrange import Lagrange
-from scene import DAMAGE, SceneError, direction_of, displacement_order, of_material, of_order, read_scene
+from scene import (
+    DAMAGE, SceneError, direction_of, displacement_order, must_be_followed, of_material, of_order, read_scene,
+)
 from triangulation import edge_keys, read_triangulation
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds
@@ -122,6 +124,7 @@ class Body:
     """Spaces, forms and node maps of one scene on one triangulation."""
 
     def __init__(self, scene, mesh):
+        must_be_followed(scene)
         self.scene, self.mesh, self.order = scene, mesh, displacement_order(scene)
         self.nodes, vertices = Lagrange(mesh, self.order), Lagrange(mesh, 1)
         # On a curved body ζ is defined on the straight triangles of the vertices.
@@ -249,6 +252,8 @@ class Damage:
     def __init__(self, body, step):
         self.body = body
         self.law = {**DAMAGE, **body.scene["damage"]}
+        if self.law["mass"] != "consistent":
+            raise SceneError("damage.mass: this check knows only the consistent mass")
         domain = body.straight
         k = fem.Constant(domain, PETSc.ScalarType(step))
         for key in ("diffusion", "lambda_d", "lambda_u", "lambda_w", "strain_cap"):

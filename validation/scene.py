@@ -31,6 +31,34 @@ def read_scene(path):
     return scene
 
 
+# The keys that the independent codes follow, and the tables without effect on the discrete answer.
+FOLLOWED = {
+    f"{table}.{key}" for table, keys in {
+        "material": "young poisson plane density", "discretisation": "displacement", "time": "end step",
+        "damage": "diffusion lambda_d lambda_u lambda_w strain_cap threshold initial mass", "body": "force gravity",
+        "boundary": "name displacement symmetry gap normal traction pressure",
+    }.items() for key in keys.split()
+}
+WITHOUT_EFFECT = {"title", "mesh", "contact", "output", "units", "probe"}
+
+
+def must_be_followed(scene):
+    """An error for a key that a code does not know: it would solve another problem."""
+    def keys():
+        for name, value in scene.items():
+            if not isinstance(value, (dict, list)):
+                yield name
+                continue
+            for table in value if isinstance(value, list) else [value]:
+                for key, entry in table.items():
+                    surface = isinstance(entry, dict)
+                    yield from (f"{name}.{inner}" for inner in (entry if surface else [key]))
+
+    unknown = sorted({key for key in keys() if key.split(".")[0] not in WITHOUT_EFFECT} - FOLLOWED)
+    if unknown:
+        raise SceneError(f"this code does not know the keys {', '.join(unknown)}; take them out of the scene")
+
+
 def of_material(scene, mesh, table, key, default=None):
     """A value of [material] or [damage] for each triangle, from the tables of its surfaces."""
     values = np.full(len(mesh.triangles), float(scene[table].get(key, default)))

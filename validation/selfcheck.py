@@ -3,6 +3,7 @@
 Run: /usr/bin/python3 validation/selfcheck.py
 """
 
+import copy
 import sys
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 import exact
 from fenicsx import evolve
 from lagrange import Lagrange
-from scene import of_order
+from scene import SceneError, of_order
 
 
 def solved(scene, mesh, order):
@@ -64,5 +65,21 @@ def uniform_damage(order):
     yield "uniform damage", np.abs(state.zeta - zeta).max(), 1e-13
 
 
+def refusals(order):
+    """A key that the code does not know is refused in every table."""
+    base = exact.on_plane("0", damage={**exact.LAW, "upper": {}}, time={"end": 1.0, "step": 0.1})
+    for *tables, name in (["drag"], ["time", "scheme"], ["material", "drag"], ["damage", "upper", "drag"],
+                          ["boundary", 0, "drag"]):
+        scene = table = copy.deepcopy(base)
+        for key in tables:
+            table = table[key]
+        table[name] = 1
+        try:
+            solved(scene, exact.square(), order)
+            yield f"{name} is refused", np.inf, 0.0
+        except SceneError as error:
+            yield f"{name} is refused", 0.0 if name in str(error) else np.inf, 0.0
+
+
 if __name__ == "__main__":
-    sys.exit(exact.run((answers, forces, partial_contact, uniform_damage), 31))
+    sys.exit(exact.run((answers, forces, partial_contact, uniform_damage, refusals), 41))

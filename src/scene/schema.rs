@@ -83,6 +83,8 @@ impl<'t> Diagnostics<'t> {
     }
 
     fn check_value(&mut self, key: String, place: Range<usize>, value: &DeValue, schema: &Schema) {
+        let same = schema["$ref"].as_str().and_then(|path| ROOT.pointer(&path[1..]));
+        let schema = same.unwrap_or(schema);
         self.places.insert(key.clone(), place);
         let before = self.problems.len();
         match (value, schema["type"].as_str()) {

@@ -9,10 +9,21 @@ fn schema() -> Value {
     serde_json::from_str(include_str!("../../geo/scene.schema.json")).expect("JSON")
 }
 
+/// A key, or the key that it refers to without its default, as it is in a surface.
+fn resolved(key: &Value) -> Value {
+    let Some(path) = key["$ref"].as_str() else { return key.clone() };
+    let mut resolved = schema().pointer(&path[1..]).expect("a key").clone();
+    let of = resolved.as_object_mut().expect("a key");
+    of.remove("default");
+    of.extend(key.as_object().expect("a key").clone());
+    resolved
+}
+
 /// Paths of all keys that are no tables, with what is told of them and whether they are required.
 fn keys() -> Vec<(String, Value, bool)> {
     fn walk(path: &str, table: &Value, keys: &mut Vec<(String, Value, bool)>) {
         for (name, key) in table["properties"].as_object().expect("keys") {
+            let key = &resolved(key);
             let required =
                 table["required"].as_array().is_some_and(|r| r.contains(&name.as_str().into()));
             assert!(key["description"].is_string(), "{path}{name} has no meaning");
