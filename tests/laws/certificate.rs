@@ -1,7 +1,7 @@
 //! The residuals that judge every answer: each fault shows in its own figure and no other, and a
 //! fault of the unknowns that a solver works with cannot hide.
 
-use crate::support::{close, close_to, difference, problem, run, square, try_run};
+use crate::support::{close, close_relative, difference, problem, run, square, try_run};
 use nalgebra::Matrix2;
 use signorini::{
     contact::{Answer, Certificate, ContactPoint, Kkt, NodalConstraint, SOLVERS, Scales},
@@ -55,13 +55,13 @@ fn each_fault_shows_in_its_own_residual_and_no_other() {
 fn a_force_across_a_gap_is_judged_by_the_smaller_of_both_whatever_the_other_is() {
     // 0.8 of 10 across 0.5 of 2.
     let (kkt, _) = judge(|force, _| force[3] = 0.8);
-    close_to(kkt.complementarity, 0.08, 1e-15);
+    close_relative(kkt.complementarity, 0.08, 1e-15);
     assert_eq!((kkt.stationarity, kkt.primal, kkt.dual), (0.0, 0.0, 0.0));
     // A wider gap makes a small force no worse, a larger force a small gap no worse.
     let (kkt, _) = judge(|force, u| (force[3], u[3]) = (0.8, -1e9));
-    close_to(kkt.complementarity, 0.08, 1e-15);
+    close_relative(kkt.complementarity, 0.08, 1e-15);
     let (kkt, _) = judge(|force, u| (force[3], u[3]) = (1e9, 1.0 - 1e-3));
-    close_to(kkt.complementarity, 5e-4, 1e-12);
+    close_relative(kkt.complementarity, 5e-4, 1e-12);
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
         points.iter().zip(shares).for_each(|(point, share)| close(point.force, share, 1e-13));
     }
     // The nearest that the cone has to (−1, 0) is nothing.
-    close_to(judged([-1.0, 0.0]).0.dual, 0.1, 1e-15);
+    close_relative(judged([-1.0, 0.0]).0.dual, 0.1, 1e-15);
 }
 
 #[test]

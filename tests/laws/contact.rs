@@ -1,7 +1,7 @@
 //! What a solution of the contact problem must be, whoever computes it.
 
 use crate::support::{
-    Random, close, close_to, difference, distorted, history, largest, problem, run, shipped,
+    Random, close, close_relative, difference, distorted, history, largest, problem, run, shipped,
 };
 use signorini::{
     contact::SOLVERS,
@@ -85,8 +85,8 @@ fn more_load_presses_more() {
             let scaled: Vec<f64> = last.state.u.iter().map(|u| t * u).collect();
             let error = difference(&step.state.u, &scaled);
             assert!(error < 1e-8, "{solver}: {error}");
-            close_to(step.record.contact_force, t * last.record.contact_force, 1e-8);
-            close_to(step.record.work, t * t * last.record.work, 1e-8);
+            close_relative(step.record.contact_force, t * last.record.contact_force, 1e-8);
+            close_relative(step.record.work, t * t * last.record.work, 1e-8);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::bore::disc;
 use crate::support::{
-    close_to, distorted, figures, moved, problem, run, shipped, square, turn, with_part,
+    close_relative, distorted, figures, moved, problem, run, shipped, square, turn, with_part,
 };
 use signorini::{
     contact::SOLVERS,
@@ -60,7 +60,7 @@ fn a_uniform_pressure_keeps_its_value_at_every_node_and_where_foundations_meet()
                 let [x, y] = turn(-angle, [row.x, row.y]);
                 let (pressure, along) =
                     if row.boundary == "left" { (2.0, 1.0 - y) } else { (3.0, x) };
-                close_to(row.pressure, pressure, 1e-9);
+                close_relative(row.pressure, pressure, 1e-9);
                 assert!(row.boundary == "far" || (row.arc_length - along).abs() < 1e-12, "{row:?}");
             }
         }
@@ -94,7 +94,7 @@ fn the_area_under_the_pressure_is_the_force_of_each_foundation() {
     // On curved edges, with one end on an axis.
     let problem = shipped("hertz", &["discretisation.displacement=2", "mesh.size=0.008"]);
     let last = run(&problem, SOLVERS[0]).last;
-    close_to(area(&parts(&problem, &last.state)[0]), last.record.contact_force, 1e-9);
+    close_relative(area(&parts(&problem, &last.state)[0]), last.record.contact_force, 1e-9);
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn a_foundation_that_is_farther_away_bears_nothing_at_a_shared_node() {
         let last = run(&problem, SOLVERS[0]).last;
         for part in parts(&problem, &last.state) {
             match &*part[0].boundary {
-                "near" => close_to(area(&part), last.record.contact_force, 1e-9),
+                "near" => close_relative(area(&part), last.record.contact_force, 1e-9),
                 _ => assert!(part.iter().all(|row| row.active == 0 && row.gap > 0.05)),
             }
         }
@@ -156,7 +156,7 @@ fn a_foundation_has_its_length_its_ends_and_its_line_of_action() {
         let figures = figures(&problem, &last);
         let value = |name: &str| figures[&format!("{foundation}.{name}")];
         let moment = value("acts_at_x") * value("force_y") - value("acts_at_y") * value("force_x");
-        close_to(moment, value("moment"), 1e-9);
+        close_relative(moment, value("moment"), 1e-9);
         if foundation == "foundation" {
             assert!((value("contact_length") - value("contact_end_x")).abs() < 2e-4);
             assert!(value("contact_start_x").abs() < 1e-12 && value("peak_x") < 1e-3);
@@ -241,7 +241,7 @@ fn contact_around_a_corner_of_a_closed_foundation_has_the_same_figures_wherever_
                 boundary = [{ name = 'rim0', gap = 0.01 }]";
     let expected = closed_figures(mesh.clone(), text, 0);
     // The bottom and the right side bear the square.
-    close_to(expected[0], 2.0, 1e-9);
+    close_relative(expected[0], 2.0, 1e-9);
     assert_eq!(expected[2..6], [0.0, 0.0, 1.0, 1.0]);
     for first in 1..16 {
         let found = closed_figures(mesh.clone(), text, first);
@@ -305,7 +305,7 @@ fn materials_side_by_side_press_with_a_pressure_each_up_to_their_interface() {
                 for part in &parts {
                     let name = format!("{}.force_y", part[0].boundary);
                     let force = figures[&name];
-                    close_to(area(part) * angle.cos(), force, 1e-9);
+                    close_relative(area(part) * angle.cos(), force, 1e-9);
                 }
             }
         }

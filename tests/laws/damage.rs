@@ -1,6 +1,8 @@
 //! The damage equation where its solution is known.
 
-use crate::support::{Random, close, close_to, distorted, history, order, problem, run, square};
+use crate::support::{
+    Random, close, close_relative, distorted, history, order, problem, run, square,
+};
 use signorini::{
     contact::SOLVERS,
     evolution::{DiscreteProblem, Outcome, Step, Stop},
@@ -47,7 +49,7 @@ fn strained_of_order(
 #[track_caller]
 fn check_uniform(step: &Step, zeta: f64) {
     for z in &step.state.zeta {
-        close_to(*z, zeta, 1e-12);
+        close_relative(*z, zeta, 1e-12);
     }
 }
 
@@ -198,7 +200,7 @@ fn uniform_stress_keeps_damage_uniform_and_follows_the_scalar_recursion() {
             zeta += 0.05 * rate(pair[0].state.time, zeta);
             for z in &pair[1].state.zeta {
                 // The contact is solved to 1e-10 at each of 20 steps.
-                close_to(*z, zeta, 1e-9);
+                close_relative(*z, zeta, 1e-9);
             }
         }
         assert!(zeta < 0.85, "the law is at work: {zeta}");

@@ -1,6 +1,6 @@
 //! The shipped Hertz scene against the half-space theory of line contact.
 
-use crate::support::{close_to, order, run, shipped, shipped_with};
+use crate::support::{close_relative, order, run, shipped, shipped_with};
 use signorini::contact::SOLVERS;
 use std::f64::consts::PI;
 
@@ -32,7 +32,7 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
         for solver in SOLVERS {
             let last = run(&problem, solver).last;
             // Vertical equilibrium of the half that is modelled.
-            close_to(last.record.contact_force, 0.5 * FORCE, 1e-9);
+            close_relative(last.record.contact_force, 0.5 * FORCE, 1e-9);
 
             let mut points: Vec<_> = (last.state.contact.iter())
                 .map(|point| (problem.body.nodes.points[point.node][0], point))
@@ -49,8 +49,8 @@ fn a_disc_on_a_plane_has_the_pressure_of_hertz() {
                 edge / half_width
             );
             // Half a node spacing is 1.5 % of a; R/a = 9 is no half-space: percents.
-            close_to(most, peak, 0.01);
-            close_to(edge, half_width, 0.02);
+            close_relative(most, peak, 0.01);
+            close_relative(edge, half_width, 0.02);
             let (mut square, mut whole) = (0.0, 0.0);
             for (x, point) in &points {
                 let theory = peak * (1.0 - (x / half_width).powi(2)).max(0.0).sqrt();

@@ -1,7 +1,7 @@
 //! The patch test: a body under uniform stress is solved exactly on any mesh.
 
 use crate::support::{
-    close_to, difference, distorted, moved, problem, run, square, turn, unstructured,
+    close_relative, difference, distorted, moved, problem, run, square, turn, unstructured,
 };
 use signorini::{
     contact::SOLVERS,
@@ -46,7 +46,7 @@ fn meshes() -> [(&'static str, Mesh); 3] {
 fn check_pressures(state: &State, pressure: f64) {
     assert!(!state.contact.is_empty());
     for point in &state.contact {
-        close_to(point.pressure, pressure, 1e-9);
+        close_relative(point.pressure, pressure, 1e-9);
         assert!(point.active && point.gap.abs() < 1e-12, "{point:?}");
     }
 }
@@ -237,12 +237,12 @@ fn an_affine_pressure_is_exact_at_the_vertices_and_midpoints_of_any_foundation()
                 assert!(error < TOLERANCE, "{solver}, {name}, {angle}: {error:.1e}");
                 for point in &state.contact {
                     let [x, _] = turn(-angle, points[point.node]);
-                    close_to(point.pressure, p + c * x, 1e-9);
+                    close_relative(point.pressure, p + c * x, 1e-9);
                 }
                 // The edge at the clamped corner, where Γ_D has a part of the reaction, is shared in halves.
                 for row in &problem.supports.contact.rows(&problem.body, &state).0[3..] {
                     let [x, _] = turn(-angle, [row.x, row.y]);
-                    close_to(row.pressure, p + c * x, 1e-9);
+                    close_relative(row.pressure, p + c * x, 1e-9);
                 }
             }
         }

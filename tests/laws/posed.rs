@@ -2,7 +2,8 @@
 //! are pressed in, pressures, loads that jump.
 
 use crate::support::{
-    close_to, difference, distorted, history, largest, layered, moved, problem, run, square, turn,
+    close_relative, difference, distorted, history, largest, layered, moved, problem, run, square,
+    turn,
 };
 use signorini::{contact::SOLVERS, evolution::Step};
 
@@ -32,7 +33,7 @@ fn check_compressed(bottom: &str, obstacles: f64, gap: &str, time: &str, g: impl
                 let exact: Vec<f64> = problem.body.nodes.points.iter().flat_map(exact).collect();
                 let error = difference(&state.u, &exact);
                 assert!(error < 1e-9, "{name}: {error:e}");
-                close_to(record.contact_force, -YOUNG * g * obstacles, 1e-8);
+                close_relative(record.contact_force, -YOUNG * g * obstacles, 1e-8);
             } else {
                 assert!(largest(&state.u) < 1e-12, "{name}");
                 assert!(record.contact_force.abs() < 1e-9, "{name}");
@@ -240,7 +241,7 @@ fn each_layer_is_damaged_by_its_own_law() {
                      { name = 'top', gap = -0.02 }]";
     let problem = problem(layered(square(6)), text).unwrap_or_else(|e| panic!("{e}"));
     let last = run(&problem, SOLVERS[0]).last;
-    close_to(1.0 - last.record.zeta_mean, 0.1 * 0.5 * 4e-4 * 200.0, 1e-9);
+    close_relative(1.0 - last.record.zeta_mean, 0.1 * 0.5 * 4e-4 * 200.0, 1e-9);
     let at = |y: f64| {
         let node = problem.body.mesh.nodes.iter().position(|x| *x == [0.5, y]).unwrap();
         last.state.zeta[node]

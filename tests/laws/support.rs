@@ -238,7 +238,7 @@ pub fn close(value: f64, expected: f64, tolerance: f64) {
 
 /// The same against the size of `expected` alone, however small it is.
 #[track_caller]
-pub fn close_to(value: f64, expected: f64, tolerance: f64) {
+pub fn close_relative(value: f64, expected: f64, tolerance: f64) {
     let error = (value - expected).abs() / expected.abs();
     assert!(error <= tolerance, "{value} is not {expected}: {error:.1e} > {tolerance:.1e}");
 }
