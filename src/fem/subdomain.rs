@@ -151,11 +151,6 @@ impl Subdomain {
         self.local(node).filter(|&local| local < self.nodes().partition.owned())
     }
 
-    /// The local index of a triangle, if it belongs to the rank.
-    pub fn own_triangle(&self, triangle: usize) -> Option<usize> {
-        self.triangle(triangle).filter(|&local| local < self.own_triangles)
-    }
-
     /// The local index of a triangle, if the rank keeps it.
     pub fn triangle(&self, triangle: usize) -> Option<usize> {
         self.triangles.iter().position(|&kept| kept == triangle)

@@ -1,11 +1,12 @@
 //! The conditions of a scene on the named parts of the boundary, node by node and edge by edge.
 
+use super::loads::SurfaceForce;
 use crate::{
     ROUNDING,
     contact::{NodalConstraint, RigidMotions},
-    fem::{Body, Edge, Terms, normal_error},
+    fem::{Body, Terms, normal_error},
     mesh::{BoundaryFace, BoundaryNode, Lines, boundary_nodes, extent, joined_faces},
-    scene::{Condition, Expression, Gap, Scene, SurfaceLoad},
+    scene::{Condition, Expression, Gap, Scene},
 };
 
 /// The conditions of all boundaries.
@@ -20,7 +21,7 @@ pub(super) struct BoundaryConditions {
     pub(super) supports: Vec<String>,
     pub(super) prescribed_by: Vec<usize>,
     /// The surface loads of Γ_N.
-    pub(super) tractions: Vec<Traction>,
+    pub(super) surface_forces: Vec<SurfaceForce>,
     /// Per node: the largest possible angle between the mesh normal and the exact normal, rad.
     normal_errors: Vec<f64>,
 }
@@ -45,14 +46,6 @@ impl RowValue {
     pub(super) fn depends_on_time(&self) -> bool {
         self.of.iter().any(Expression::depends_on_time)
     }
-}
-
-/// A surface load on a part of the boundary.
-#[derive(Debug, Clone)]
-pub(super) struct Traction {
-    pub(super) edges: Vec<Edge>,
-    /// f_N, N/m².
-    pub(super) force: SurfaceLoad,
 }
 
 impl BoundaryConditions {
@@ -94,9 +87,8 @@ impl BoundaryConditions {
                     }
                 }
             }
-            let tractions = boundary.loads().cloned();
-            let tractions = tractions.map(|force| Traction { edges: edges.clone(), force });
-            conditions.tractions.extend(tractions);
+            let forces = boundary.loads().map(|force| SurfaceForce::new(points, &edges, force));
+            conditions.surface_forces.extend(forces);
             if boundary.is_support() {
                 conditions.supports.push(boundary.name.clone());
             }

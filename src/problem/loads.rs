@@ -18,7 +18,8 @@ use crate::{
     fem::{Body, Subdomain},
     scene::{Expression, Scene},
 };
-use forces::{BodyForce, SurfaceForce};
+use forces::BodyForce;
+pub(super) use forces::SurfaceForce;
 use std::mem::take;
 
 /// The nodal loads and the values of all rows, as functions of time.
@@ -38,15 +39,14 @@ pub struct Loads {
 impl Loads {
     /// Takes the loads on `body` and the values of its rows from the `conditions`.
     pub(super) fn new(body: &Body, scene: &Scene, conditions: &mut BoundaryConditions) -> Self {
-        let (tractions, values) = (take(&mut conditions.tractions), take(&mut conditions.values));
+        let values = take(&mut conditions.values);
         let first = |(row, value): (&NodalConstraint, &RowValue)| match row.is_gap() {
             true => value.at(scene.start()),
             false => 0.0,
         };
         let first_gaps = conditions.rows.iter().zip(&values).map(first).collect();
         let body_force = BodyForce::new(body, scene);
-        let surface_forces = tractions.into_iter().map(|load| SurfaceForce::new(body, load));
-        let surface_forces = surface_forces.collect();
+        let surface_forces = take(&mut conditions.surface_forces);
         let constant = None;
         let mut loads = Self { body_force, surface_forces, values, first_gaps, constant };
         if !loads.forces().any(Expression::depends_on_time) {
@@ -76,7 +76,7 @@ impl Loads {
         let body = body.map(|force| ("body force", "triangles", force.missed));
         let surface = self.surface_forces.iter().map(|force| {
             let missed = times.iter().map(|&t| force.resolved(t).missed).fold(0.0, f64::max);
-            (force.force.name(), "edges", missed)
+            ("surface load", "edges", missed)
         });
         let note = |(name, elements, missed): (&str, &str, f64)| {
             let part = match missed < 1.0 {

@@ -34,7 +34,8 @@ impl Condition {
             Self::Displacement(_) => "displacement",
             Self::Symmetry => "symmetry",
             Self::Gap(_) => "gap",
-            Self::Load(load) => load.name(),
+            Self::Load(SurfaceLoad::Traction(_)) => "traction",
+            Self::Load(SurfaceLoad::Pressure(_)) => "pressure",
         }
     }
 
@@ -68,14 +69,6 @@ pub enum SurfaceLoad {
 }
 
 impl SurfaceLoad {
-    /// Its key in a scene.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Traction(_) => "traction",
-            Self::Pressure(_) => "pressure",
-        }
-    }
-
     /// f_N at a point, m, with the outward normal there, and a time, s.
     pub fn at(&self, [x, y]: [f64; 2], normal: [f64; 2], t: f64) -> [f64; 2] {
         match self {

@@ -321,7 +321,7 @@ fn loads_that_are_too_narrow_to_be_integrated_are_noted() {
     for (load, fragment) in [
         ("body if(abs(y - 0.3*x - 0.2) < 1e-6, 1, 0)", "the body force changes too sharply"),
         ("body if(abs(y - 0.3*x - 0.2) < 5e-4, 1, 0)", "% of it may be missed; refine the mesh"),
-        ("top sin(1e6*x)^2", "the traction changes too sharply"),
+        ("top sin(1e6*x)^2", "the surface load changes too sharply"),
     ] {
         let notes = notes(load);
         assert!(notes.len() == 1 && notes[0].contains(fragment), "{load}: {notes:?}");

@@ -6,7 +6,6 @@ use super::parts::{
 use crate::{
     fem::{Body, Edge, GAUSS, Subdomain, TriangleParts, add_body_force, add_traction, parabola},
     mesh::{BoundaryFace, CHORDS},
-    problem::boundary_conditions::Traction,
     scene::{Expression, Scene, SurfaceLoad},
 };
 use nalgebra::Vector2;
@@ -24,9 +23,9 @@ const BODY_FORCE_TIMES: usize = 4;
 const MAX_SAMPLES: usize = 500;
 
 #[derive(Debug)]
-pub(super) struct SurfaceForce {
+pub(in crate::problem) struct SurfaceForce {
     /// f_N, N/m².
-    pub(super) force: SurfaceLoad,
+    force: SurfaceLoad,
     /// Its edges in the undivided body: ends and middles, m. All ranks divide them in the same way.
     lines: Vec<[[f64; 2]; 3]>,
     /// The halves of the same edges as parts of a smooth curve.
@@ -38,12 +37,15 @@ pub(super) struct SurfaceForce {
 }
 
 impl SurfaceForce {
-    pub(super) fn new(body: &Body, Traction { edges, force }: Traction) -> Self {
-        let points = &body.nodes.points;
+    pub(in crate::problem) fn new(
+        points: &[[f64; 2]],
+        edges: &[Edge],
+        force: &SurfaceLoad,
+    ) -> Self {
         let line = |edge: &Edge| [0.0, 0.5, 1.0].map(|s| edge.at(points, s));
         let lines = edges.iter().map(line).collect();
-        let smooth = smooth_halves(&edges, points);
-        let edges = edges.into_iter().map(Some).collect();
+        let smooth = smooth_halves(edges, points);
+        let (force, edges) = (force.clone(), edges.iter().copied().map(Some).collect());
         let mut new = Self { force, lines, smooth, edges, constant: None };
         if !new.expressions().any(Expression::depends_on_time) {
             let mut samples = Vec::new();
