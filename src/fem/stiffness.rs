@@ -25,15 +25,21 @@ pub struct Stiffness {
 
 /// K in the unknowns of nodal bases, from the elements.
 struct ElementOperator {
-    /// The terms of K. Each has per element and pair of its nodes (i, j) the places of both rows of K_ij among the
-    /// stored entries: `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
-    terms: Vec<(Box<dyn ElementSums>, Vec<[u32; 2]>)>,
+    terms: Vec<TermOperator>,
     nodes: Rc<Nodes>,
     bases: NodalBases,
     /// The diagonal entry of fixed unknowns.
     scale: f64,
     /// The places of the entries in rows or columns of fixed unknowns. Is the entry on the diagonal?
     fixed: Vec<(u32, bool)>,
+}
+
+/// A term of K.
+struct TermOperator {
+    sums: Box<dyn ElementSums>,
+    /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
+    /// `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
+    places: Vec<[u32; 2]>,
 }
 
 /// The place of a row that is not stored.
@@ -78,8 +84,9 @@ impl Stiffness {
             }
             rows
         };
-        let of_term = |term: &dyn Term| {
-            (term.sums(body), couples(term.nodes(body)).map(&mut place).collect())
+        let of_term = |term: &dyn Term| TermOperator {
+            sums: term.sums(body),
+            places: couples(term.nodes(body)).map(&mut place).collect(),
         };
         let of_terms = terms.all().map(of_term).collect();
         of_fixed.sort_unstable();
@@ -116,13 +123,13 @@ impl Stiffness {
 
 impl ElementOperator {
     fn set_damage(&mut self, body: &Body, zeta: &[f64]) {
-        self.terms.iter_mut().for_each(|(sums, _)| sums.set(body, zeta));
+        self.terms.iter_mut().for_each(|term| term.sums.set(body, zeta));
     }
 
     /// The diagonal entries of the owned unknowns; D⁻ᵀ K_ii D⁻¹ with the bases D.
     fn diagonal(&self) -> Vec<f64> {
         let mut blocks = vec![[0.0; 3]; self.nodes.points.len()];
-        self.terms.iter().for_each(|(sums, _)| sums.add_diagonal(&mut blocks));
+        self.terms.iter().for_each(|term| term.sums.add_diagonal(&mut blocks));
         let of_node = |(node, [xx, xy, yy]): (usize, [f64; 3])| match self.bases.inverse(node) {
             None => [xx, yy],
             Some(inverse) => {
@@ -155,7 +162,7 @@ impl Operator for RefCell<ElementOperator> {
         let mut u = nodes.partition.field(u, 2)?;
         bases.displacement_to_global(&mut u);
         let mut force = vec![0.0; u.len()];
-        terms.iter().for_each(|(sums, _)| sums.add_forces(&u, &mut force));
+        terms.iter().for_each(|term| term.sums.add_forces(&u, &mut force));
         bases.force_to_local(&mut force);
         y.copy_from_slice(&force[..y.len()]);
         let fixed = zip(zip(y, x), bases.fixed()).filter(|(_, fixed)| **fixed);
@@ -169,7 +176,7 @@ impl Operator for RefCell<ElementOperator> {
 
     fn write(&self, entries: &mut [f64]) {
         let ElementOperator { terms, bases, scale, fixed, .. } = &*self.borrow();
-        for (sums, places) in terms {
+        for TermOperator { sums, places } in terms {
             sums.for_blocks(&mut |[upper, lower], nodes, mut block| {
                 let [of_i, of_j] = nodes.map(|node| bases.inverse(node));
                 block = of_i.map_or(block, |inverse| inverse.transpose() * block);
@@ -187,7 +194,7 @@ impl Operator for RefCell<ElementOperator> {
 
     fn bytes(&self) -> f64 {
         let ElementOperator { terms, nodes, .. } = &*self.borrow();
-        (terms.iter().map(|(sums, _)| sums.bytes()).sum::<usize>()
+        (terms.iter().map(|term| term.sums.bytes()).sum::<usize>()
             + 4 * size_of_val(&nodes.points[..])) as f64
     }
 }
