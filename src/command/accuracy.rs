@@ -1,6 +1,6 @@
 //! Runs with a required accuracy: adapts the mesh before the run, and checks the accuracy after it.
 
-use super::{Failure, kinks, screen, task::Task};
+use super::{Failure, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Measured},
     evolution::{AIM, Outcome, percent},
@@ -154,7 +154,7 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
 /// that they only follow roughly.
 pub(super) fn kink_note(task: &Task) -> Option<String> {
     let (mesh, scene) = (&task.adapted.as_ref()?.mesh, task.problem.scene());
-    let kinks = kinks(scene, mesh, scene.accuracy?).into_iter();
+    let kinks = estimate::kinks(scene, mesh, scene.accuracy?).into_iter();
     let kinks = kinks.filter(|(allowed, kink)| !kink.is_corner && kink.angle > 2.0 * allowed);
     let (_, kink) = kinks.max_by(|(a, p), (b, q)| (p.angle / a).total_cmp(&(q.angle / b)))?;
     let at = mesh.place(mesh.nodes[kink.node]);

@@ -29,15 +29,15 @@ pub use script::{ScriptArguments, script};
 use clap::Args;
 use ranks::require_one_process;
 use signorini::{
-    contact::{self, REGISTRY, SOLVERS, TAO_TYPES, summaries},
+    contact::{self, REGISTRY, SOLVERS, TAO_TYPES},
+    estimate,
     interrupt::{Signal, received},
-    mesh::{self, Kink, Mesh, MeshError, Order},
+    mesh::{self, Mesh},
     output::terminal::say,
     problem::{Figure, Figures},
-    scene::{Boundary, Condition, MeshSource, SCHEMA, Scene, Units},
+    scene::{MeshSource, SCHEMA, Scene, Units},
 };
 use std::{
-    collections::HashSet,
     fmt,
     io::{self, Write},
     path::PathBuf,
@@ -217,74 +217,9 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
         && adapts
         && file.extension().is_none_or(|kind| kind != "msh")
     {
-        return first_mesh(scene, accuracy);
+        return estimate::first_mesh(scene, accuracy).map_err(Failure::input);
     }
     mesh::load(file, parameters, scene.order).map_err(Failure::input)
-}
-
-/// The angle, rad, at which arcs along a smooth curve may meet, over the accuracy. A note tells twice as large ones.
-const KINK: f64 = 0.1;
-
-/// The angles at which arcs meet along the curves of a mesh, and the allowed ones. Contact presses on a small part of a
-/// curve, where it may turn by a hundredth only: the angles must be much smaller there.
-fn kinks(scene: &Scene, mesh: &Mesh, accuracy: f64) -> Vec<(f64, Kink)> {
-    const IN_CONTACT: f64 = 0.03;
-    let nodes_where = |is_so: &dyn Fn(&Boundary) -> bool| -> HashSet<usize> {
-        let named = scene.boundaries.iter().filter(|boundary| is_so(boundary));
-        let curves = named.filter_map(|boundary| mesh.curves.get(&boundary.name));
-        curves.flat_map(|curve| curve.edges.concat()).collect()
-    };
-    let touching = nodes_where(&|boundary| boundary.gap().is_some());
-    let mirror = nodes_where(&|boundary| {
-        boundary.conditions.iter().any(|condition| matches!(condition, Condition::Symmetry))
-    });
-    let part = |kink: &Kink| if touching.contains(&kink.node) { IN_CONTACT } else { 1.0 };
-    let allowed = |kink: Kink| (KINK * accuracy * part(&kink), kink);
-    let is_meant = |kink: &Kink| !kink.is_mirrored || mirror.contains(&kink.node);
-    mesh.kinks().into_iter().filter(is_meant).map(allowed).collect()
-}
-
-/// The mesh of a `.geo` from which the adaptation to an accuracy starts. Its order is 2 also for linear elements, so
-/// that refined sides stay on the arcs through the nodes of this mesh.
-///
-/// Where arcs follow another smooth curve, they meet at a small angle, which stays. Stresses at an angle δ grow like
-/// h^(−δ/π), about. So the mesh becomes finer there until these angles are a tenth of the accuracy; they fall like h³.
-fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, Failure> {
-    /// Triangles along the body.
-    const CELLS: f64 = 4.0;
-    /// Meshes that are graded towards angles, as the third power holds for small ones, corners stay, and gmsh may fail.
-    const GRADINGS: usize = 8;
-    let MeshSource { file, parameters } = &scene.mesh;
-    let usual = mesh::load(file, parameters, Order::Linear).map_err(Failure::input)?;
-    let scaling = mesh::scaling_factor(file).map_err(Failure::input)?;
-    let mut parameters = parameters.clone();
-    parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
-    let mut first = mesh::load(file, &parameters, Order::Quadratic).map_err(Failure::input)?;
-    // The smallest ratio of the sizes in one grading. gmsh fails at some strong ones.
-    let mut ratio = 0.25_f64;
-    for grading in 0..GRADINGS {
-        // The end of a slender ellipse is no corner, though it looks like one on the first meshes.
-        let is_corner = |kink: &Kink| grading >= 2 && kink.is_corner;
-        let is_rough = |(allowed, kink): &(f64, Kink)| kink.angle > *allowed && !is_corner(kink);
-        let rough = kinks(scene, &first, accuracy).into_iter().filter(is_rough);
-        let size = |(allowed, kink): (f64, Kink)| {
-            (kink.node, kink.length * (0.5 * allowed / kink.angle).cbrt().max(ratio))
-        };
-        let wanted = Vec::from_iter(rough.map(size));
-        if wanted.is_empty() {
-            break;
-        }
-        let sizes = (&first, &first.graded_sizes(wanted)[..]);
-        first = match mesh::load_graded(file, &parameters, Order::Quadratic, sizes) {
-            Ok(finer) => finer,
-            Err(MeshError::File { .. }) => {
-                ratio = ratio.sqrt();
-                continue;
-            }
-            Err(error) => return Err(Failure::input(error)),
-        };
-    }
-    Ok(first)
 }
 
 /// The reference of all keys of a scene. scripts/keys.py makes it from their schema.

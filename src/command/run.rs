@@ -9,7 +9,7 @@ use super::{
     ranks::{agree, barrier_or_abort},
     read_mesh,
     recorder::Recorder,
-    screen, summaries,
+    screen,
     task::Task,
     tell,
 };
@@ -39,7 +39,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[arg(long, value_name = "NAME", help = format!(
-        "Contact solver [default: the scene's, else {}]:\n{}", SOLVERS[0], summaries()
+        "Contact solver: {} [default: the scene's, else {}]; `signorini solvers` describes them",
+        SOLVERS.join(", "), SOLVERS[0]
     ))]
     solver: Option<String>,
     /// Print a closing table of phases (time, time per call, bytes moved) and all notes, also minor ones.

@@ -5,7 +5,7 @@ use signorini::{
     estimate::Adapted,
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, plain, say, with_bar},
-    problem::Collapse,
+    problem::{Collapse, in_words},
     scene::{Scheme, Stepping, TimeGrid, rounded},
 };
 use std::{
@@ -152,7 +152,7 @@ fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
     let of_material = |name: &str| {
         let [von_mises, most, least] = ["von_mises_max", "principal_max", "principal_min"]
             .map(|kind| figures.full_text(&format!("{name}.{kind}")));
-        row("", format!("{name}: von Mises {von_mises}, σ₁ {most}, σ₂ {least}"))
+        row("", format!("{}: von Mises {von_mises}, σ₁ {most}, σ₂ {least}", in_words(name)))
     };
     let materials = task.problem.materials();
     let several = materials.clone().count() > 1;

@@ -29,5 +29,4 @@ pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_m
 pub use solvers::{
     Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PREFIX as ELASTIC,
     PenaltyOptions, REGISTRY, SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers,
-    summaries,
 };

@@ -226,12 +226,6 @@ pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
     found.ok_or_else(|| SolverError { name: name.to_owned() })
 }
 
-/// All solvers and their summaries, a line each, for `--help`.
-pub fn summaries() -> String {
-    let line = |entry: &SolverEntry| format!("{:<16} {}", entry.name, entry.summary);
-    REGISTRY.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
 /// The names that [`find`] knows.
 fn names() -> Vec<String> {
     let of = |entry: &SolverEntry| {

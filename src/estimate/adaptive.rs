@@ -16,6 +16,7 @@
 //! `sizes` turns errors into the sizes of triangles.
 
 mod changes;
+mod first_mesh;
 mod limits;
 mod measurement;
 mod few_step_run;
@@ -34,6 +35,7 @@ use crate::{
 };
 pub use few_step_run::INSTANTS;
 use few_step_run::{FEW, FewStepRun};
+pub use first_mesh::{first_mesh, kinks};
 use limits::Limits;
 use measurement::Measurement;
 use progress::Progress;

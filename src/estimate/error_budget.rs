@@ -1,9 +1,7 @@
 //! The computation of the error budget.
 
-use super::RecoveredStrains;
 use crate::{
     evolution::{ErrorBudget, Outcome},
-    petsc::PetscError,
     problem::{DiscreteProblem, State},
 };
 use nalgebra::DVector;
@@ -17,7 +15,7 @@ impl ErrorBudget {
     ) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
         let (body, zeta) = (&problem.body, DVector::from_column_slice(&state.zeta));
-        let caused = |error: &[f64]| problem.displacement_error_of(error, state);
+        let caused = |error: &[f64]| displacement_error_of(problem, error, state);
         let min_max = |field: &[f64]| body.vertices.partition.min_max(field);
         let error = steps.as_ref().map(|[error, _]| error.as_slice());
         let bars = |[error, bar]: &[DVector<f64>; 2]| {
@@ -35,7 +33,7 @@ impl ErrorBudget {
             displacement_mesh: accuracy.energy,
             damage_mesh: None,
             displacement_steps: error.map(caused),
-            damage_steps: error.and_then(|error| problem.relative_to_damage(error, state)),
+            damage_steps: error.and_then(|error| relative_to_damage(problem, error, state)),
             solver: accuracy.displacement,
             can_be_damaged: problem.damage().is_some(),
             bars_of_steps: steps.as_ref().map(bars),
@@ -43,42 +41,33 @@ impl ErrorBudget {
     }
 }
 
-impl DiscreteProblem {
-    /// The estimated error of u in the energy norm, relative, from the mesh. Collective.
-    pub(crate) fn energy_error(&self, zeta: &[f64], u: &[f64]) -> Result<f64, PetscError> {
-        let recovered = RecoveredStrains::new(&self.body, u)?;
-        let zeta = self.zeta_at_points(zeta);
-        Ok(recovered.energy_error(&self.terms, &zeta, u).relative())
+/// ‖field‖ / ‖ζ₀ − ζ‖ in L², by the weights of the vertices; `None` without damage. Collective.
+fn relative_to_damage(problem: &DiscreteProblem, field: &[f64], state: &State) -> Option<f64> {
+    let vertices = &problem.body.vertices;
+    let initial = problem.initial_damage();
+    let values = field.iter().zip(initial.iter().zip(&state.zeta));
+    let mut sums = [0.0; 2];
+    let owned = vertices.weights.iter().zip(values).take(vertices.partition.owned());
+    for (weight, (value, (from, zeta))) in owned {
+        sums[0] += weight * value * value;
+        sums[1] += weight * (from - zeta) * (from - zeta);
     }
+    vertices.partition.comm().sum(&mut sums);
+    (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
+}
 
-    /// ‖field‖ / ‖ζ₀ − ζ‖ in L², by the weights of the vertices; `None` without damage. Collective.
-    pub(super) fn relative_to_damage(&self, field: &[f64], state: &State) -> Option<f64> {
-        let vertices = &self.body.vertices;
-        let initial = self.initial_damage();
-        let values = field.iter().zip(initial.iter().zip(&state.zeta));
-        let mut sums = [0.0; 2];
-        let owned = vertices.weights.iter().zip(values).take(vertices.partition.owned());
-        for (weight, (value, (from, zeta))) in owned {
-            sums[0] += weight * value * value;
-            sums[1] += weight * (from - zeta) * (from - zeta);
-        }
-        vertices.partition.comm().sum(&mut sums);
-        (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
+/// A bound on the relative error of u in the energy norm due to errors δζ = `error`. As K δu = −δK u, it is
+/// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ, max(ζ, ζ + δζ) replaces ζ, and the factor is at most 1. Collective.
+fn displacement_error_of(problem: &DiscreteProblem, error: &[f64], state: &State) -> f64 {
+    let body = &problem.body;
+    let (zeta, error) = (problem.zeta_at_points(&state.zeta), body.at_points(error));
+    let energies = problem.terms.elasticity.energies(body, &zeta, &state.u);
+    let own = energies.len() / body.triangles.len() * body.own_triangles;
+    let mut sums = [0.0; 2];
+    for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {
+        sums[0] += energy * (error / zeta.max(zeta + error)).powi(2).min(1.0);
+        sums[1] += energy;
     }
-
-    /// A bound on the relative error of u in the energy norm due to errors δζ = `error`. As K δu = −δK u, it is
-    /// ‖δζ/ζ ε(u)‖ over ‖ε(u)‖. For large δζ, max(ζ, ζ + δζ) replaces ζ, and the factor is at most 1. Collective.
-    pub(super) fn displacement_error_of(&self, error: &[f64], state: &State) -> f64 {
-        let body = &self.body;
-        let (zeta, error) = (self.zeta_at_points(&state.zeta), body.at_points(error));
-        let energies = self.terms.elasticity.energies(body, &zeta, &state.u);
-        let own = energies.len() / body.triangles.len() * body.own_triangles;
-        let mut sums = [0.0; 2];
-        for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {
-            sums[0] += energy * (error / zeta.max(zeta + error)).powi(2).min(1.0);
-            sums[1] += energy;
-        }
-        body.nodes.partition.comm().sum(&mut sums);
-        if sums[1] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 }
-    }
+    body.nodes.partition.comm().sum(&mut sums);
+    if sums[1] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 }
 }

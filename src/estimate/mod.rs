@@ -20,7 +20,9 @@ mod extremes;
 mod error_budget;
 mod adaptive;
 
-pub use adaptive::{AdaptError, Adapted, INSTANTS, Measured, adapted, measured_errors};
+pub use adaptive::{
+    AdaptError, Adapted, INSTANTS, Measured, adapted, first_mesh, kinks, measured_errors,
+};
 pub use extremes::{Extreme, Extremes};
 pub use recovery::{EnergyError, RecoveredStrains};
 
@@ -90,7 +92,9 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
     let (last, most) = (&outcome.last, outcome.most_displaced());
     let unloaded = last.record.displacement_max < UNLOADED * most.record.displacement_max;
     let state = if unloaded { &most.state } else { &last.state };
-    problem.energy_error(&state.zeta, &problem.strained(state).u)
+    let (body, u) = (&problem.body, &problem.strained(state).u);
+    let (recovered, zeta) = (RecoveredStrains::new(body, u)?, problem.zeta_at_points(&state.zeta));
+    Ok(recovered.energy_error(&problem.terms, &zeta, u).relative())
 }
 
 impl Outcome {

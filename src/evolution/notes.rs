@@ -2,7 +2,7 @@
 
 use super::{Accuracy, DiscreteProblem, Outcome, percent};
 use crate::{
-    fem::for_elements,
+    fem::{Body, for_elements},
     mesh::{distance, extent},
     scene::{Stepping, rounded},
 };
@@ -31,7 +31,8 @@ impl Outcome {
                     "ζ_* was reached too early or wrongly: the sources allow no ζ below {least:.4}"
                 )
             }),
-            self.bound_violation.note(problem.mass(), problem.slowest_diffusion()),
+            self.bound_violation
+                .note(problem.mass(), slowest_diffusion(&problem.body, &problem.diffusions())),
             self.unconstrained.as_ref().map(|(steps, times, motion)| {
                 let [first, last] = times.map(rounded);
                 let when = match steps {
@@ -61,7 +62,7 @@ impl Outcome {
                 let times = moved / size;
                 format!("the largest displacement is {times:.1} times the body; check units, gaps and loads")
             }),
-            problem.large_gradients(&self.last.state.u),
+            large_gradients(&problem.body, &self.last.state.u),
             self.rescued.as_ref().map(|(steps, solver)| {
                 let steps = counted(*steps);
                 format!("in {steps} the solver missed the tolerance and {solver} gave the answer")
@@ -112,36 +113,31 @@ impl Outcome {
     }
 }
 
-impl DiscreteProblem {
-    /// min κ/h² over the triangles, 1/s, with h the longest side. Collective.
-    fn slowest_diffusion(&self) -> f64 {
-        let (body, kappa) = (&self.body, self.diffusions());
-        let rate = |(t, corners): (usize, &[usize; 3])| {
-            let [a, b, c] = corners.map(|node| body.mesh.nodes[node]);
-            let h = distance(a, b).max(distance(b, c)).max(distance(c, a));
-            kappa.get(body.material(t)).map_or(f64::INFINITY, |kappa| kappa / (h * h))
-        };
-        let own = body.mesh.triangles.iter().enumerate().map(rate).fold(f64::INFINITY, f64::min);
-        body.nodes.partition.comm().min(own)
-    }
+/// min κ/h² over the triangles, 1/s, with h the longest side. Collective.
+fn slowest_diffusion(body: &Body, kappa: &[f64]) -> f64 {
+    let rate = |(t, corners): (usize, &[usize; 3])| {
+        let [a, b, c] = corners.map(|node| body.mesh.nodes[node]);
+        let h = distance(a, b).max(distance(b, c)).max(distance(c, a));
+        kappa.get(body.material(t)).map_or(f64::INFINITY, |kappa| kappa / (h * h))
+    };
+    let own = body.mesh.triangles.iter().enumerate().map(rate).fold(f64::INFINITY, f64::min);
+    body.nodes.partition.comm().min(own)
+}
 
-    /// A note if u is too large for infinitesimal strains: |∇u| (Frobenius) above `LARGE` in a noticeable part of
-    /// the body. A translation does not count.
-    fn large_gradients(&self, u: &[f64]) -> Option<String> {
-        let body = &self.body;
-        let gradients = for_elements!(body, cells => cells.gradients(u));
-        let own = gradients.iter().zip(&body.triangles).take(body.own_triangles);
-        let large =
-            own.filter(|(gradient, _)| gradient.norm() > LARGE).map(|(_, t)| t.area()).sum();
-        let part = body.nodes.partition.comm().total(large) / body.area;
-        (part > NOTICEABLE).then(|| {
-            format!(
-                "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \
-                 for linear elasticity; if that is not meant, check the units of loads and moduli",
-                100.0 * part
-            )
-        })
-    }
+/// A note if u is too large for infinitesimal strains: |∇u| (Frobenius) above `LARGE` in a noticeable part of
+/// the body. A translation does not count.
+fn large_gradients(body: &Body, u: &[f64]) -> Option<String> {
+    let gradients = for_elements!(body, cells => cells.gradients(u));
+    let own = gradients.iter().zip(&body.triangles).take(body.own_triangles);
+    let large = own.filter(|(gradient, _)| gradient.norm() > LARGE).map(|(_, t)| t.area()).sum();
+    let part = body.nodes.partition.comm().total(large) / body.area;
+    (part > NOTICEABLE).then(|| {
+        format!(
+            "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \
+             for linear elasticity; if that is not meant, check the units of loads and moduli",
+            100.0 * part
+        )
+    })
 }
 
 /// "1 step" or "n steps".

@@ -6,13 +6,10 @@ mod jumps;
 mod parts;
 
 pub(crate) use curve::LoadCurve;
-pub(super) use jumps::{jump, near_jumps};
+pub(super) use jumps::{jump, load_jumps, near_jumps};
 pub(super) use parts::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point};
 
-use super::{
-    boundary_conditions::{BoundaryConditions, RowValue},
-    notes::NOTED,
-};
+use super::boundary_conditions::{BoundaryConditions, RowValue};
 use crate::{
     contact::NodalConstraint,
     fem::{Body, Subdomain},
@@ -21,6 +18,11 @@ use crate::{
 use forces::BodyForce;
 pub(super) use forces::SurfaceForce;
 use std::mem::take;
+
+/// A note is given if more than this fraction of a load, a displacement or a damage is missed.
+pub(crate) const NOTED: f64 = 0.05;
+/// Approximate number of sample times of loads, for their maximum, and of what the mesh must resolve.
+pub(super) const SAMPLE_TIMES: usize = 8;
 
 /// The nodal loads and the values of all rows, as functions of time.
 #[derive(Debug)]

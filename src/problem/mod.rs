@@ -17,7 +17,6 @@ mod contact_figures;
 mod contact_line;
 mod error;
 mod figures;
-mod load_case;
 mod loads;
 mod mean_displacement;
 mod nodal_stress;
@@ -33,17 +32,15 @@ pub use collapse::Collapse;
 pub(crate) use contact_figures::{ContactFigures, rows_of};
 pub use contact_line::{ContactLine, ContactRow};
 pub use error::SetupError;
-pub use figures::{Bar, Dimension, Figure, Figures, Of, Value};
+pub use figures::{Bar, Dimension, Figure, Figures, Of, Value, in_words};
 pub(crate) use figures::{NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
 use figures::{PartOfBoundary, Parts};
-pub(crate) use load_case::LoadCase;
 pub(crate) use loads::LoadCurve;
 pub use loads::Loads;
-use loads::near_jumps;
+use loads::{NOTED, SAMPLE_TIMES, near_jumps};
 pub(crate) use mean_displacement::MeanDisplacement;
 use mean_displacement::Means;
 pub use nodal_stress::{NodalStress, Strained, principal, principal_direction};
-use notes::NOTED;
 pub use notes::locks;
 pub(crate) use singular::SEEN;
 pub use singular::Singular;
@@ -52,7 +49,8 @@ pub use supports::Supports;
 pub(crate) use unresolved::unresolved;
 
 use crate::{
-    contact::{Certificate, Constraints, RigidMotions},
+    ROUNDING,
+    contact::{Bound, Certificate, Constraints, RigidMotions},
     fem::{Body, Mass, Subdomain, Terms},
     mesh::{Lines, Mesh},
     model::DamageLaw,
@@ -60,6 +58,7 @@ use crate::{
     scene::{Scene, Stepping, TimeGrid},
 };
 use boundary_conditions::BoundaryConditions;
+use nalgebra::DVector;
 use probe::Probes;
 use std::{
     collections::BTreeMap,
@@ -104,6 +103,21 @@ pub struct DiscreteProblem {
     undivided: Option<(Mesh, Vec<usize>)>,
 }
 
+/// The data of the contact problem (26) at one time.
+#[derive(Debug)]
+pub(crate) struct LoadCase {
+    /// t, s.
+    pub(crate) time: f64,
+    /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
+    pub(crate) load: Vec<f64>,
+    pub(crate) work: DVector<f64>,
+    /// The values of all constraints, m, and the unknowns c that they prescribe, 0 elsewhere.
+    pub(crate) values: Vec<f64>,
+    pub(crate) c_prescribed: Vec<f64>,
+    /// The bounds on the other unknowns.
+    pub(crate) bounds: Vec<Bound>,
+}
+
 impl DiscreteProblem {
     /// Binds `scene` to `mesh` and checks at sampled times that a solution exists. If the body loses its support at
     /// some time, the scene ends just before.
@@ -128,7 +142,7 @@ impl DiscreteProblem {
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(&conditions.rows);
         let supports = Supports::new(&scene, &body, &conditions, &lines);
-        let norms = (scene.sample_times(notes::SAMPLE_TIMES).into_iter())
+        let norms = (scene.sample_times(SAMPLE_TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
         let mut problem = Self {
@@ -186,6 +200,62 @@ impl DiscreteProblem {
     /// The names of the boundaries with a gap.
     pub fn foundations(&self) -> &[String] {
         &self.foundations
+    }
+
+    /// Nodal loads at `time`, N per metre of thickness. Rounding, as in sin(pi) = 1.2e-16, counts as zero.
+    pub fn load(&self, time: f64) -> Vec<f64> {
+        let mut load = self.loads.at(&self.body, time);
+        if self.body.nodes.partition.norm(&load, 2) <= ROUNDING * self.largest_load {
+            load.fill(0.0);
+        }
+        load
+    }
+
+    /// The data of (26) at `time`.
+    ///
+    /// # Errors
+    /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not finite, contradict
+    /// each other or penetrate the obstacle; or the obstacles leave a node no space.
+    pub(crate) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
+        let load = self.motions.balanced(&self.body, self.checked_load(time)?);
+        let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
+        let values = self.loads.values_at(time);
+        let (c_prescribed, bounds) = self.prescribed_and_bounds(time, &values)?;
+        Ok(LoadCase { time, load, work, values, c_prescribed, bounds })
+    }
+
+    /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
+    pub(super) fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
+        let load = self.load(time);
+        if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
+            return Err(self.not_finite(time));
+        }
+        let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
+        let error = || self.loads.resultant_error(&self.body, time);
+        self.motions.check(&self.body, &load, error).map_err(driven)?;
+        Ok(load)
+    }
+
+    /// The error for a value that is not finite at `time`. It names the value if this rank finds it.
+    fn not_finite(&self, time: f64) -> SetupError {
+        match self.scene.check_values(&self.body.mesh, &[time]) {
+            Err(error) => error.into(),
+            Ok(()) => SetupError::NotFinite { scene: self.scene.path.clone(), time },
+        }
+    }
+
+    /// The prescribed unknowns and the bounds on the others at `time`, from the values of all rows.
+    pub(super) fn prescribed_and_bounds(
+        &self,
+        time: f64,
+        values: &[f64],
+    ) -> Result<(Vec<f64>, Vec<Bound>), SetupError> {
+        if !values.iter().all(|value| value.is_finite()) {
+            return Err(self.not_finite(time));
+        }
+        let (scene, time) = (self.scene.path.clone(), self.scene.time.map(|_| time));
+        let constraint = |source| SetupError::Constraint { scene, time, source };
+        self.constraints.prescribed_and_bounds(values, &self.body.nodes.points).map_err(constraint)
     }
 
     /// Is there a Γ_C?

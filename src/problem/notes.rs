@@ -1,6 +1,6 @@
 //! Notes for the user on a problem, before any solve.
 
-use super::{DiscreteProblem, LoadCurve, unresolved};
+use super::{DiscreteProblem, LoadCurve, SAMPLE_TIMES, unresolved};
 use crate::{
     mesh::{Order, extent},
     model::Plane,
@@ -15,10 +15,6 @@ const LOCKING: f64 = 0.45;
 const CONTRAST: f64 = 1e5;
 /// A note is given if obstacles overlap the body by more than this fraction of its size.
 const OVERLAP: f64 = 1e-9;
-/// A note is given if more than this fraction of a load, a displacement or a damage is missed.
-pub(crate) const NOTED: f64 = 0.05;
-/// Approximate number of sample times of loads, for their maximum, and of what the mesh must resolve.
-pub(super) const SAMPLE_TIMES: usize = 8;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
 
@@ -31,10 +27,9 @@ pub fn locks(scene: &Scene) -> Option<f64> {
 
 impl DiscreteProblem {
     /// Notes for the user before any solve: input that was changed, unconstrained rigid motions, and functions,
-    /// materials or triangles that make the discretisation poor. Collective.
+    /// materials or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
         let (scene, linear) = (self.scene(), self.scene().order == Order::Linear);
-        let is_curved = self.body.nodes.partition.comm().any(!self.body.mesh.curved.is_empty());
         let mut notes = self.mesh().notes.clone();
         notes.extend(scene.time.and_then(|grid| grid.note()));
         notes.extend(self.motions.free.iter().map(|motion| {
@@ -68,7 +63,7 @@ impl DiscreteProblem {
                      may be far too small; set discretisation.displacement = 2"
                 )
             }),
-            (linear && is_curved).then(|| {
+            (linear && !self.mesh().curved.is_empty()).then(|| {
                 "curved sides count as straight; discretisation.displacement = 2 follows them".to_owned()
             }),
             self.collapse_on_a_point().map(|_| {
@@ -130,10 +125,8 @@ impl DiscreteProblem {
 
     /// A note on the triangle with the smallest angle, if this angle is small.
     fn sliver(&self) -> Option<String> {
-        let (own, at) = self.body.mesh.smallest_angle();
-        let comm = self.body.nodes.partition.comm();
-        let (angle, rank) = comm.min_with_rank(own);
-        let at = self.mesh().place(at.map(|coordinate| comm.broadcast(rank, coordinate)));
+        let (angle, at) = self.mesh().smallest_angle();
+        let at = self.mesh().place(at);
         (angle < SLIVER).then(|| {
             format!("a triangle at {at} has an angle of {angle:.1e}°: mend the mesh there")
         })

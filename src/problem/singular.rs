@@ -8,7 +8,10 @@
 //! z is continuous at interfaces. Sectors with the angles α₁, α₂, … transfer it by T = … exp(α₂A₂) exp(α₁A₁). The sides
 //! have conditions B z = 0 and C z = 0, so that det(B; CT) = 0. Inside the body z returns to itself: det(T − I) = 0.
 
-use super::{DiscreteProblem, loads::jump};
+use super::{
+    DiscreteProblem,
+    loads::{jump, load_jumps},
+};
 use crate::{
     mesh::Lines,
     scene::{Boundary, Condition},
@@ -145,6 +148,26 @@ impl DiscreteProblem {
         });
         let corners = first.filter_map(|edge| self.singular(&wedges, &supports, edge));
         corners.chain(self.shear_jumps(&wedges.lines)).collect()
+    }
+
+    /// The jumps of a shear load τ on smooth boundaries: nearby σ_tt grows like (2τ/π) ln r along the tangent t. A jump of the
+    /// normal load leaves stresses bounded.
+    fn shear_jumps(&self, lines: &Lines) -> Vec<Singular> {
+        let singular = |(node, [x, y, pressure]): (usize, [f64; 3])| {
+            let ends = &lines.ends[&node];
+            let [tx, ty] = lines.tangent(node, ends[0]);
+            let shear = (x * tx + y * ty).abs() / tx.hypot(ty);
+            let radius =
+                ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max);
+            let (at, name) = (self.mesh().nodes[node], "a jump of a shear load".to_owned());
+            (shear > SEEN * x.hypot(y).hypot(pressure)).then_some(Singular {
+                at,
+                radius,
+                name,
+                is_open: false,
+            })
+        };
+        load_jumps(self.scene(), self.mesh(), lines).into_iter().filter_map(singular).collect()
     }
 
     /// The lines of the mesh with its wedges.

@@ -1,9 +1,8 @@
 //! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
 //! nodes, and may vary more between them.
 
-use super::{
-    loads::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point},
-    notes::{NOTED, SAMPLE_TIMES},
+use super::loads::{
+    DEVIATION, NOTED, SAMPLE_TIMES, centroid, edge_parts, triangle_parts, triangle_point,
 };
 use crate::{
     fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},

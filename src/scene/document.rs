@@ -177,19 +177,16 @@ impl SceneText {
 
     /// The problem of a key at `place` that the file has above already, perhaps in another form.
     fn given_twice(&self, place: &Range<usize>) -> String {
-        let (_, line) = self.line(place.start).unwrap_or_default();
-        let header = line.trim_start().strip_prefix('[').map(|rest| rest.trim_start_matches('['));
-        let path = header.and_then(|rest| rest.split(']').next()).unwrap_or_default();
+        let (start, line) = self.line(place.start).unwrap_or_default();
         let key = self.file.get(place.clone()).unwrap_or_default();
-        let is_last = path.trim_end().ends_with(key);
-        match path.rsplit_once('.') {
+        let rest = line.get(place.end - start..).unwrap_or_default().trim_start();
+        match (line.trim_start().starts_with('['), rest.starts_with(']')) {
             _ if LISTS.contains(&key) => format!("{key} is a list, each begins with [[{key}]]"),
-            _ if header.is_none() => format!("{key} is given above already; keep one"),
-            Some((table, _)) if is_last => format!(
-                "{key} is in [{table}] above already; merge the two, or give the surface another name"
+            (false, _) => format!("{key} is given above already; keep one"),
+            (true, true) => format!(
+                "{key} is given above already; merge the two, or give a surface another name than a key"
             ),
-            Some(_) => format!("{key} = … stands above; write it as a table [{key}] there"),
-            None => format!("{key} is given above already; merge the two"),
+            (true, false) => format!("{key} = … stands above; write it as a table [{key}] there"),
         }
     }
 

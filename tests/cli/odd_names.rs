@@ -1,6 +1,6 @@
 //! Names and paths that are unusual and allowed: bytes that are not UTF-8, signs that separate lists and folders.
 
-use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, square};
+use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, msh, square};
 use std::{
     ffi::{OsStr, OsString},
     fs,
@@ -79,11 +79,11 @@ fn names_of_boundaries_with_signs() {
     directory.write("square.msh", &renamed(&square(4)));
     let figures = "\"a,b.force_y\",it's {x} %s.force_x";
     directory.run(&["--accuracy", "0.5", "--accuracy-of", figures]);
-    let columns = "\"quantities.a,b.force_y\",quantities.it's {x} %s.force_x,work";
+    let columns = "\"a,b.force_y\",it's {x} %s.force_x,work";
     let Some(said) = directory.say_python(&["table", "out/scene", "--columns", columns]) else {
         return;
     };
-    assert!(said.code == Some(0) && said.out.contains("quantities.a,b.force_y"), "{said:?}");
+    assert!(said.code == Some(0) && said.out.contains("a,b.force_y"), "{said:?}");
     for (_, name) in sides {
         let along = ["figures", "out/scene", "--along", name, "--format", "svg"];
         let said = directory.say(&along);
@@ -117,4 +117,21 @@ fn equal_and_similar_runs_of_a_study() {
     fs::write(directory.path("cases.csv"), words).expect("written");
     let said = directory.say(&["study", "scene.toml", "--cases", "cases.csv"]);
     assert!(said.code == Some(2) && said.err.contains("cases.csv: is not in UTF-8"), "{said:?}");
+}
+
+/// The surfaces without a table of their own are the rest of the body, whatever the names of the others.
+#[test]
+fn the_rest_of_the_body_has_no_name_of_a_key() {
+    let corners = ["1 0 0 0", "2 1 0 0", "3 1 1 0", "4 0 1 0"];
+    let sides = ["1 1 1 1 2", "2 1 3 3 4", "3 1 4 4 1"];
+    let mesh = msh(&corners, &[&sides[..], &["4 2 5 1 2 3", "5 2 6 1 3 4"]].concat());
+    for own in ["body", "6"] {
+        let directory = TestDirectory::new();
+        directory.write("square.msh", &mesh);
+        let said = directory.run(&["--set", &format!("material.{own}.young=100")]);
+        for name in [own, "the rest of the body"] {
+            assert!(said.out.contains(&format!(" {name}: von Mises")), "{name}: {said:?}");
+        }
+        assert!(!said.out.contains(" material: "), "{said:?}");
+    }
 }

@@ -178,6 +178,11 @@ impl Index<usize> for Figures {
     }
 }
 
+/// The name of a material in texts. Surfaces without a table of their own are the rest of the body.
+pub fn in_words(material: &str) -> &str {
+    if material == "material" { "the rest of the body" } else { material }
+}
+
 impl Figures {
     /// The list of all figures.
     pub(crate) fn new(parts: &Parts) -> Self {
@@ -287,7 +292,7 @@ impl Figures {
         for (k, (kind, label, dimension, governing)) in figures.into_iter().enumerate() {
             let (name, place) = match of {
                 Of::Body => (kind.to_owned(), String::new()),
-                Of::Material(of) => (format!("{of}.{kind}"), format!(" in {of}")),
+                Of::Material(of) => (format!("{of}.{kind}"), format!(" in {}", in_words(of))),
                 Of::Boundary(of) => (format!("{of}.{kind}"), format!(" of {of}")),
                 Of::Probe(of) => (format!("{of}.{kind}"), format!(" at {of}")),
             };

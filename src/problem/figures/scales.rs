@@ -1,7 +1,7 @@
 //! The error bars of figures, and the scales of their relative errors.
 
 use super::{Dimension, Figure, Figures, Of, Value};
-use crate::problem::{DiscreteProblem, notes::SAMPLE_TIMES};
+use crate::problem::{DiscreteProblem, SAMPLE_TIMES};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -2,7 +2,6 @@
 
 use crate::{
     mesh::{Lines, Mesh, sorted},
-    problem::{DiscreteProblem, SEEN, Singular},
     scene::{Scene, SurfaceLoad},
 };
 use std::collections::{BTreeMap, BTreeSet};
@@ -52,7 +51,11 @@ pub(crate) fn near_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<bool>
 
 /// The vertices of smooth free boundaries at which, or within half of an edge of which, a surface load jumps; each with the
 /// largest jump (t_x, t_y, pressure), Pa. The sides of a support are left out: its reaction is not known.
-fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usize, [f64; 3])> {
+pub(in crate::problem) fn load_jumps(
+    scene: &Scene,
+    mesh: &Mesh,
+    lines: &Lines,
+) -> Vec<(usize, [f64; 3])> {
     // Per edge its loads; `None` if it is supported.
     let mut edges = BTreeMap::<[usize; 2], Option<Vec<&SurfaceLoad>>>::new();
     for boundary in &scene.boundaries {
@@ -85,26 +88,4 @@ fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usize, [f64; 3]
         (norm(&largest) > 0.0).then_some((node, largest))
     });
     found.collect()
-}
-
-impl DiscreteProblem {
-    /// The jumps of a shear load τ on smooth boundaries: nearby σ_tt grows like (2τ/π) ln r along the tangent t. A jump of the
-    /// normal load leaves stresses bounded.
-    pub(in crate::problem) fn shear_jumps(&self, lines: &Lines) -> Vec<Singular> {
-        let singular = |(node, [x, y, pressure]): (usize, [f64; 3])| {
-            let ends = &lines.ends[&node];
-            let [tx, ty] = lines.tangent(node, ends[0]);
-            let shear = (x * tx + y * ty).abs() / tx.hypot(ty);
-            let radius =
-                ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max);
-            let (at, name) = (self.mesh().nodes[node], "a jump of a shear load".to_owned());
-            (shear > SEEN * x.hypot(y).hypot(pressure)).then_some(Singular {
-                at,
-                radius,
-                name,
-                is_open: false,
-            })
-        };
-        load_jumps(self.scene(), self.mesh(), lines).into_iter().filter_map(singular).collect()
-    }
 }
