@@ -29,7 +29,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-validate deps-random build mesh run figures keys test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook \
-    constants fuzz clean
+    constants architecture fuzz clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -54,6 +54,7 @@ help:
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
 	@echo 'make handbook   published and closed answers, with bars and with --accuracy (minutes); or ARGS="hertz_plane"'
 	@echo 'make constants  the register of tuned constants, validation/CONSTANTS.md, from their comments'
+	@echo 'make architecture  the picture of the rooms of src, geo/rooms.svg, from their use lines'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
 	@echo 'make clean      remove the build, the results and the meshes'
 
@@ -149,6 +150,9 @@ promises: build
 
 constants:
 	@$(PYTHON) validation/constants.py > $@.md && mv $@.md validation/CONSTANTS.md
+
+architecture: deps
+	$(PYTHON) scripts/architecture.py geo/rooms.svg
 
 handbook: build
 	$(PYTHON) validation/handbook.py --binary $(BINARY) $(ARGS)
