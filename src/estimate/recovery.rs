@@ -1,7 +1,7 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
 use crate::{
-    fem::{Body, Fit, Patches, Terms, monomials},
+    fem::{Body, Fit, Terms, monomials},
     petsc::PetscError,
 };
 use nalgebra::{Matrix6, Matrix6x3, Vector3};
@@ -42,15 +42,7 @@ impl<'a> RecoveredStrains<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
-        Self::on(&Patches::new(body), body, body.strains(u))
-    }
-
-    /// Recovers the `strains` at the quadrature points of `body`. Collective.
-    pub(super) fn on(
-        patches: &Patches,
-        body: &'a Body,
-        strains: Vec<Vector3<f64>>,
-    ) -> Result<Self, PetscError> {
+        let (patches, strains) = (body.patches(), body.strains(u));
         let fits = patches.fits(&strains, Some(&body.vertices.partition))?;
         Ok(Self { body, strains, per_triangle: patches.per_triangle, fits })
     }

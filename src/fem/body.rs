@@ -1,14 +1,17 @@
 //! The body: its triangulation, and the nodes and elements of u and ζ with their owners.
 
 use super::{
-    Cells, Edge, Elements, Partition, Triangle,
+    Cells, Edge, Elements, Partition, Patches, Triangle,
     element::{POINTS, Quadratic, quadratic_values},
     for_elements,
 };
 use crate::mesh::{Mesh, Order, sorted};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap as HashMap;
-use std::rc::Rc;
+use std::{
+    rc::Rc,
+    sync::{Arc, OnceLock},
+};
 
 /// A triangulated body, or the subdomain of it that this rank keeps.
 #[derive(Debug)]
@@ -37,6 +40,7 @@ pub struct Body {
     pub centroid: [f64; 2],
     /// Its ∫|x − x̄|², m⁴.
     pub polar_inertia: f64,
+    pub(super) patches: OnceLock<Arc<Patches>>,
 }
 
 /// The nodes of a continuous finite element space: those that this rank owns, then ghosts.
@@ -109,7 +113,13 @@ impl Body {
             area,
             centroid,
             polar_inertia,
+            patches: OnceLock::new(),
         }
+    }
+
+    /// The fits of polynomials to strains around the vertices. The first call is collective.
+    pub(crate) fn patches(&self) -> &Arc<Patches> {
+        self.patches.get_or_init(|| Patches::new(self).into())
     }
 
     /// The elements of u.

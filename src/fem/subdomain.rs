@@ -6,7 +6,7 @@ use crate::{
     petsc::{Ghosts, PetscError, Session, divide},
 };
 use rustc_hash::FxHashMap as HashMap;
-use std::{collections::BTreeSet, rc::Rc};
+use std::{collections::BTreeSet, rc::Rc, sync::OnceLock};
 
 /// The nodes and triangles of a subdomain: the owned nodes, the triangles around them, and the other nodes of
 /// these triangles as ghosts.
@@ -209,6 +209,7 @@ impl Subdomain {
             },
             vertices,
             quadratic: elements,
+            patches: OnceLock::new(),
             ..*undivided
         }
     }

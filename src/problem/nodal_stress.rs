@@ -18,7 +18,7 @@ use std::{borrow::Cow, sync::Arc};
 /// node's number; the others follow. This value needs neither PETSc nor the problem, so that a thread can use it.
 #[derive(Debug)]
 pub struct NodalStress {
-    pub(crate) patches: Patches,
+    patches: Arc<Patches>,
     pub(crate) points: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
@@ -75,7 +75,7 @@ impl NodalStress {
             }
         }
         let materials = problem.terms.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
-        Self { patches: Patches::new(body), points, cells, materials }
+        Self { patches: Arc::clone(body.patches()), points, cells, materials }
     }
 
     /// The node of each point.

@@ -167,7 +167,10 @@ fn more_than_one_body() {
     complains(three, &["has 3 pieces, two of them around (0.3333, 0.3333) and (4.3333, 1.0000)"]);
     // Two triangles that meet in the node (1, 0).
     let hinged = text(&nodes, &[FIRST, "2 2 1 2 7 5"]);
-    complains(hinged, &["x.msh: parts of the mesh meet in a single node only, at (1.0000, 0.0000); join"]);
+    complains(
+        hinged,
+        &["x.msh: parts of the mesh meet in a single node only, at (1.0000, 0.0000); join"],
+    );
     // A ring closed in a node is one body: two of its triangles meet there, all in edges elsewhere.
     let nodes = ["1 0 0 0", "2 2 0 0", "3 1 1 0", "4 -1 1 0", "5 0 2 0", "6 -2 0 0", "7 0 3 0"];
     let ring =

@@ -281,7 +281,11 @@ fn a_bad_mesh_is_told_once() {
     let directory = TestDirectory::new();
     directory.write("hinged.geo", HINGED);
     let said = run_on_ranks(&directory, 2, &["--mesh", "hinged.geo"]);
-    one_message(&said, 2, "hinged.geo: parts of the mesh meet in a single node only, at (1.0000, 1.0000)");
+    one_message(
+        &said,
+        2,
+        "hinged.geo: parts of the mesh meet in a single node only, at (1.0000, 1.0000)",
+    );
     assert!(!directory.path("out").exists(), "nothing is written");
 }
 

@@ -4,7 +4,7 @@ use crate::{
     estimate::{Extremes, RecoveredStrains, UNLOADED},
     evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
-    problem::{DiscreteProblem, NodalStress, State, Value},
+    problem::{DiscreteProblem, State, Value},
 };
 
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated.
@@ -190,8 +190,7 @@ impl History {
         }
         let zeta = problem.zeta_at_points(&state.zeta);
         let state = &problem.strained(state);
-        let strains = NodalStress::strained(problem, state).strains;
-        let recovered = RecoveredStrains::on(&problem.nodal_stress().patches, body, strains)?;
+        let recovered = RecoveredStrains::new(body, &state.u)?;
         let error = recovered.energy_error(&problem.terms, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
