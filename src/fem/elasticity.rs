@@ -9,7 +9,7 @@ use crate::model::Material;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Stresses, internal forces and energies of a displacement field, triangle by triangle.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Elasticity {
     /// The materials by their numbers, and A of each as the matrix D of [`Material::stiffness`], Pa.
     materials: Vec<(Material, Matrix3<f64>)>,

@@ -50,7 +50,7 @@ pub(crate) trait ElementSums {
 }
 
 /// All terms of K. The operator, the certificate, the energy and the rigid motions walk this list.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Terms {
     /// ∫ ζ Aε(u) : ε(v).
     pub elasticity: Elasticity,

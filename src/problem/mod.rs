@@ -131,8 +131,7 @@ impl DiscreteProblem {
         let lines = Lines::boundary(&body.mesh);
         body.near_jumps = near_jumps(&scene, &body.mesh, &lines);
         let mut conditions = BoundaryConditions::new(&scene, &body, &lines);
-        let terms = Terms::new(scene.materials());
-        let motions = conditions.resolve_motions(&body, &terms);
+        let motions = conditions.resolve_motions(&body);
         let loads = Loads::new(&body, &scene, &mut conditions);
         let (points, values) = (&body.nodes.points, loads.values_at(scene.start()));
         let mut constraints =
@@ -148,7 +147,7 @@ impl DiscreteProblem {
         let mut problem = Self {
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
-            terms,
+            terms: conditions.terms,
             laws: if scene.time.is_some() { scene.damage_laws() } else { Vec::new() },
             constraints,
             motions,
