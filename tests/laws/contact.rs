@@ -9,9 +9,9 @@ use signorini::{
 };
 
 /// A bending L over an obstacle from which its arm partly lifts off, elastic and static.
-fn lshape(sets: &[&str]) -> DiscreteProblem {
+fn lshape(step: &str, sets: &[&str]) -> DiscreteProblem {
     let uniform = ["discretisation.displacement=1", "mesh.parameters.grading=1", "mesh.size=0.5"];
-    let sets = [&uniform[..], &["time.step=1"], sets].concat();
+    let sets = [&uniform[..], &[step], sets].concat();
     shipped("lshape", &sets)
 }
 
@@ -43,7 +43,7 @@ fn project(problem: &DiscreteProblem, u: &[f64], v: &mut [f64]) {
 #[test]
 fn no_feasible_displacement_has_less_energy() {
     for solver in SOLVERS {
-        let problem = lshape(&[]);
+        let problem = lshape("time.step=1", &[]);
         let state = run(&problem, solver).last.state;
         let (least, residual) = energy(&problem, &state, &state.u);
         let (mut random, size) = (Random::new(11), largest(&state.u));
@@ -76,7 +76,7 @@ fn more_load_presses_more() {
     // A load kt on a linear body whose contact set does not change with k: u and the
     // pressures are proportional to it (g = 0: the problem is positively homogeneous).
     for solver in SOLVERS {
-        let problem = lshape(&["time.step=0.25", "damage.lambda_u=0", "damage.lambda_d=0"]);
+        let problem = lshape("time.step=0.25", &["damage.lambda_u=0", "damage.lambda_d=0"]);
         let (steps, _) = history(&problem, solver);
         let last = &steps[4];
         assert!(largest(&steps[0].state.u) == 0.0, "no load at t = 0");
