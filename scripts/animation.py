@@ -4,7 +4,6 @@ import matplotlib.pyplot as plt
 from matplotlib.animation import FFMpegWriter, PillowWriter
 
 from contact_pressure import draw_pressure
-from drawing import wrap_titles
 from limits import limits_of
 from maps import draw_state
 from reading import evenly, states
@@ -32,16 +31,15 @@ def animate(results, factor, kind):
         raise ResultError("--animate mp4 needs ffmpeg (Debian: apt install ffmpeg); or use gif")
     chosen = states(results, evenly(results.frames, FRAMES))
     limits = limits_of(chosen, factor)
-    body = "damage" if limits.damaged else "stress"
+    body = "damage" if limits.is_damaged else "stress"
     for name, draw in ((body, draw_state), ("pressure", draw_pressure)):
         figure = draw(chosen[0], limits)
         if figure is None:
             continue
         path, movie = results.folder / f"{name}.{kind}", writer(fps=RATE)
-        # Frames must all have the size of the figure.
-        with plt.rc_context({"savefig.bbox": None}), movie.saving(figure, path, dpi=110):
+        with movie.saving(figure, path, dpi=110):
             for state in chosen:
-                wrap_titles(draw(state, limits, figure))
+                draw(state, limits, figure)
                 movie.grab_frame()
         plt.close(figure)
         yield path

@@ -1,10 +1,15 @@
 """Pictures of Γ_C: pressure and gap along it, and the pressure in time."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from bars import three_digits
-from drawing import BLUE, FAINT, along, canvas, draw_colourbar, headline, stress_unit, wide
+from drawing import (
+    AROUND_PLOTS, BAR, BLUE, FAINT, OPTIONS, along, canvas, draw_colourbar, em, headline, power_of, stress_unit,
+    times_power, wide,
+)
+
+# The least width of a panel, in the size of letters; panels of many boundaries stand in several rows.
+LEAST = 9.0
 
 
 def draw_pressure(results, limits, figure=None):
@@ -12,45 +17,70 @@ def draw_pressure(results, limits, figure=None):
     curves = results.curves
     if not curves:
         return None
+    left, right, top, bottom = (em() * of for of in AROUND_PLOTS)
+    right *= 1.0 if len(curves) == 1 else 1.6
     width = wide(max(7.2, min(3.8 * len(curves), 14.0)))
-    figure = canvas((width, np.clip(0.64 * width, 3.4, 4.6)), figure)
-    rows = figure.subplots(2, len(curves), squeeze=False, sharex="col", sharey="row",
-                           gridspec_kw={"height_ratios": (2.2, 1), "wspace": 0.08})
+    count = min(len(curves), max(1, int((width - left) / (LEAST * em() + right))))
+    lines = -(-len(curves) // count)
+    panel = (width - left - count * right) / count
+    # Pictures of one row are as high as other plots.
+    high = max(min(3.0, 0.42 * width) if lines == 1 else 0.0, 13.0 * em())
+    pressure, gap = 0.7 * high, 0.3 * high
+    columns = [(left, panel, right)] + [(0.0, panel, right)] * (count - 1)
+    rows = [(top, pressure, 1.8 * em()), (0.0, gap, bottom)] * lines
+    # A row of titles, and one without.
+    names = [name for k in range(lines) for name in (_names(curves)[k * count:(k + 1) * count] + [""] * count)]
     factor, unit = stress_unit(limits.pressure, results.units)
-    for curve, name, (above, below) in zip(curves, _names(curves), rows.T):
-        s, label = along(curve.points, results.units)
-        pressure, gap = curve.pressure / factor, curve.gap
-        above.set_title(name, parse_math=False)
-        active = curve.active & (pressure > 0.0)
-        # Markers are smaller if there are many nodes.
-        size = np.clip(180.0 / len(curve.points), 1.5, 5.0)
-        for axes, values in ((above, pressure), (below, gap)):
-            axes.plot(s, values, color=BLUE, linewidth=1.2, zorder=2)
-            for nodes, face in ((active, BLUE), (~active, "white")):
-                axes.scatter(s[nodes], values[nodes], s=size**2, facecolor=face, edgecolor=BLUE,
-                             linewidth=0.8, zorder=3)
-            axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=1)
-            for corner in s[_corners(curve.points)]:
-                axes.axvline(corner, color=FAINT, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
-            axes.margins(x=0.03)
-        above.fill_between(s, 0.0, pressure, color=BLUE, alpha=0.12, linewidth=0)
-        below.set_xlabel(label)
-    _scale(rows[0, 0], limits.pressure / factor)
-    _scale(rows[1, 0], limits.gap)
-    rows[0, 0].set_ylabel(f"contact pressure ({unit})")
-    rows[1, 0].set_ylabel(f"gap ({results.units['length']})")
-    rows[1, 0].ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
-    for face, name in ((BLUE, "in contact"), ("white", "open")):
-        rows[0, -1].scatter([], [], s=25, facecolor=face, edgecolor=BLUE, linewidth=0.8, label=name)
-    rows[0, -1].legend(loc="best")
-    text = f"{results.active} of {results.summary.get('contact_nodes', '?')} nodes active"
+    figure, axes = canvas(columns, rows, headline(results, _contact(results, limits, factor, unit)),
+                          names if OPTIONS.titles else (), figure=figure)
+    power = power_of(limits.gap)
+    for k, curve in enumerate(curves):
+        above, below = (axes[(2 * (k // count) + part) * count + k % count] for part in (0, 1))
+        _draw_curve(above, below, curve, factor, 10.0**power, panel)
+        below.set_xlabel(along(curve.points, results.units)[1])
+        above.tick_params(labelbottom=False, labelleft=k % count == 0)
+        below.tick_params(labelleft=k % count == 0)
+        _scale(above, limits.pressure / factor)
+        _scale(below, limits.gap / 10.0**power)
+        if k % count == 0:
+            above.set_ylabel(f"pressure ({unit})")
+            below.set_ylabel(f"gap{times_power(power, results.units['length'])}")
+    for k in range(len(curves), lines * count):
+        for part in (0, 1):
+            axes[(2 * (k // count) + part) * count + k % count].remove()
+    return figure
+
+
+def _contact(results, limits, factor, unit):
+    """The caption: the number of nodes in contact, and a pressure that is not shown."""
+    if results.unloaded:
+        return f"contact at {results.moment}, unloaded"
+    if results.active is None:
+        return f"contact at {results.moment}"
+    text = f"contact at {results.moment}; filled: {results.active} of {results.summary.get('contact_nodes', '?')} nodes"
     largest = results.pressure.max()
     if largest > limits.pressure > 0.0:
         text += f"; the pressure goes up to {three_digits(largest / factor)} {unit}"
-    text = "unloaded" if results.unloaded else "" if results.active is None else text
-    text = ", ".join(filter(None, (f"contact at {results.moment}", text)))
-    figure.suptitle(headline(results, text))
-    return figure
+    return text
+
+
+def _draw_curve(above, below, curve, stress, length, width):
+    """Pressure and gap, in these units, along a part of a boundary, in panels of this width, inches."""
+    s, _ = along(curve.points, {"length": ""})
+    pressure, gap = curve.pressure / stress, curve.gap / length
+    active = curve.active & (pressure > 0.0)
+    # Markers are smaller if there are many nodes.
+    size = np.clip(27.0 * width / len(curve.points), 1.5, 5.0)
+    for axes, values in ((above, pressure), (below, gap)):
+        axes.plot(s, values, color=BLUE, linewidth=1.2, zorder=2)
+        for nodes, face in ((active, BLUE), (~active, "white")):
+            axes.scatter(s[nodes], values[nodes], s=size**2, facecolor=face, edgecolor=BLUE, linewidth=0.8, zorder=3)
+        axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=1)
+        for corner in s[_corners(curve.points)]:
+            axes.axvline(corner, color=FAINT, linewidth=0.8, linestyle=(0, (1, 2)), zorder=1)
+        axes.margins(x=0.03)
+        axes.locator_params("x", nbins=int(np.clip(width / (5.0 * em()), 1, 6)))
+    above.fill_between(s, 0.0, pressure, color=BLUE, alpha=0.12, linewidth=0)
 
 
 def _corners(points):
@@ -69,6 +99,8 @@ def _scale(axes, largest):
     """Scales the axis from 0 to the largest value; the axis of a zero field has the tick 0 only."""
     if largest > 0.0:
         axes.set_ylim(-0.08 * largest, 1.08 * largest)
+        axes.locator_params("y", nbins=int(np.clip(axes.get_position().height * axes.figure.get_size_inches()[1]
+                                                   / (2.5 * em()), 1, 6)))
     else:
         axes.set_ylim(-1.0, 1.0)
         axes.set_yticks([0.0])
@@ -80,24 +112,24 @@ def draw_evolution(states, limits):
     curves = first.curves
     if not curves or len(states) < 3:
         return None
-    size = wide(7.2), 1.2 + min(2.8 * len(curves), 8.0)
-    figure, rows = plt.subplots(len(curves), 1, figsize=size, squeeze=False, sharex=True)
+    left, _, top, bottom = (em() * of for of in AROUND_PLOTS)
+    column = (left, wide(7.2) - left - BAR * em(), BAR * em())
+    high = min(2.8 * len(curves), 8.0) / len(curves) - top - bottom
     factor, unit = stress_unit(limits.pressure, first.units)
+    text = f"contact pressure ({unit}) in {len(states)} frames; white: open"
+    figure, rows = canvas([column], [(top, max(high, 1.0), bottom)] * len(curves), headline(last, text),
+                          _names(curves) if OPTIONS.titles else ())
     times = np.array([state.time for state in states])
-    for k, (curve, name, axes) in enumerate(zip(curves, _names(curves), rows[:, 0])):
+    for k, (curve, axes) in enumerate(zip(curves, rows)):
         s, label = along(curve.points, first.units)
         pressure = np.array([state.curves[k].pressure for state in states]).T / factor
-        axes.set_title(name, parse_math=False)
         shown = np.ma.masked_where(pressure <= 0.0, pressure)
         image = axes.pcolormesh(_between(times), _between(s), shown, cmap="viridis", vmin=0.0,
                                 vmax=limits.pressure / factor or 1.0, rasterized=True)
-        draw_colourbar(axes, image, f"contact pressure ({unit})")
-        axes.set_ylabel(label)
+        draw_colourbar(axes, image)
+        axes.set(ylabel=label, xlabel=f"time t ({first.units['time']})")
         for side in ("top", "right"):
             axes.spines[side].set_visible(True)
-    rows[-1, 0].set_xlabel(f"time t ({first.units['time']})")
-    text = f"contact pressure on $\\Gamma_C$ in {len(states)} frames; white: open"
-    figure.suptitle(headline(last, text))
     return figure
 
 

@@ -1,9 +1,13 @@
-"""Common parts of the figures: style, maps with equal aspect, readable scales."""
+"""Common parts of the pictures: style, places of axes in inches, maps with equal aspect, readable scales."""
 
 import os
 import resource
 import sys
 import textwrap
+from dataclasses import dataclass
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Callable
 
 # Address space in bytes that the packages and a small picture take. OpenBLAS waits for ever when it gets no buffer.
 NEEDED = 320 << 20
@@ -23,7 +27,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.colors import Normalize
+from matplotlib.font_manager import FontProperties
 from matplotlib.patheffects import withTickedStroke
+from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
@@ -35,62 +41,195 @@ INK, FAINT, BLUE, RED, GREEN = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b", "#3d8
 
 plt.rcParams.update({
     "figure.dpi": 160,
-    "figure.constrained_layout.use": True,
-    "savefig.bbox": "tight",
-    "savefig.pad_inches": 0.1,
     "font.size": 10,
-    "axes.titlesize": 10.5,
-    "figure.titlesize": 11,
+    "axes.titlesize": "medium",
     "axes.edgecolor": INK,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "legend.frameon": False,
     "axes.formatter.limits": (-3, 5),
-    "axes.formatter.use_mathtext": True,
     # TrueType fonts, which journals accept.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
 })
 
+# What the command line asks of pictures: their width, inches, or None for widths of their own; the size of letters,
+# points, or None for one that suits the width; the largest height of maps, inches; whether they have titles, and in these the name of the run; whether maps have contour lines; the column
+# of history.csv over which forces are drawn, and the smallest and the largest stress of the colours, Pa, or None to
+# choose.
+OPTIONS = SimpleNamespace(width=None, size=None, height=8.0, titles=True, head=True, contours=False, abscissa=None, range=None)
+# The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
+# top, bottom), in the size of letters.
+LINE = 1.35
+AROUND_MAPS = 5.6, 1.8, 1.0, 3.6
+AROUND_PLOTS = 7.0, 1.8, 1.4, 3.8
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# The least width of pictures that have a width of their own, inches.
+NARROWEST = 6.4
+# The place to the right of a map for a colour bar, in the size of letters.
+BAR = 6.4
 
-# The least number of letters in a line of a title.
-SHORTEST = 12
-# The width of every figure, inches, or None for widths of their own.
-WIDTH = None
 
-
-def set_width(inches):
-    """Makes every figure so wide, with fonts that suit it."""
-    global WIDTH
-    WIDTH = inches
-    size = 8 if inches < 5.0 else 9 if inches < 8.0 else 10
-    plt.rcParams.update({"font.size": size, "axes.titlesize": size, "figure.titlesize": size + 0.5})
+def use(**options):
+    """Sets options."""
+    vars(OPTIONS).update(options)
+    width = OPTIONS.width or np.inf
+    plt.rcParams["font.size"] = OPTIONS.size or (8 if width < 5.0 else 9 if width < 8.0 else 10)
 
 
 def wide(inches):
-    """The width of a figure that is by itself so wide."""
-    return WIDTH or inches
+    """The width of a picture that is by itself so wide."""
+    return OPTIONS.width or inches
 
 
-def panels_of(extent):
-    """A figure with two maps of a body of this extent, side by side if there is room, and their axes."""
-    if extent[0] < 2.5 * extent[1] and wide(11.8) >= 6.5:
-        width, height = map_size(extent, 0.5 * wide(11.8) - 0.9)
-        return (2 * (width + 0.9), height + 0.5), (1, 2)
-    width, height = map_size(extent, wide(8.9) - 0.9)
-    return (width + 0.9, 2 * height + 0.5), (2, 1)
+def em():
+    """The size of letters, inches."""
+    return plt.rcParams["font.size"] / 72
 
 
-def canvas(size, figure=None):
-    """An empty figure: a new one of `size`, inches; `figure`, cleared in its own size; or a part of the pages that
-    `figure` stands for."""
+@lru_cache(maxsize=4096)
+def width_of(text, size=None):
+    """The width of a text of this size, points, in inches."""
+    size = size or plt.rcParams["font.size"]
+    return text_to_path.get_text_width_height_descent(text, FontProperties(size=size), False)[0] / 72
+
+
+def wrapped(text, width, size=None):
+    """The lines of a text that are not wider than `width`, inches, except for single words."""
+    lines = []
+    for paragraph in text.splitlines():
+        lines.append("")
+        for word in paragraph.split():
+            longer = f"{lines[-1]} {word}".strip()
+            if lines[-1] and width_of(longer, size) > width:
+                lines.append(word)
+            else:
+                lines[-1] = longer
+    return lines
+
+
+def canvas(columns, rows, caption="", titles=(), below=0.0, figure=None):
+    """A picture with a caption and axes in columns and rows, and the axes in the order of reading.
+
+    The columns are (left, width, right), the rows (top, height, bottom), in inches: places for labels around the boxes
+    of the axes. Titles stand above the axes. `below` is a place for a legend. The picture is a new figure; `figure`,
+    cleared; or a part of the pages that `figure` stands for.
+    """
+    width = max(sum(map(sum, columns)), wide(NARROWEST))
+    inset = 0.5 * (width - sum(map(sum, columns)))
+    caption = wrapped(caption, width - 1.2 * em()) if OPTIONS.titles else []
+    line, count = LINE * em(), len(columns)
+    rooms = [sum(column) for column in columns] if count > 1 else [width - inset - columns[0][0]]
+    titles = [wrapped(title, rooms[k % count] - em()) for k, title in enumerate(titles)]
+    above = [line * max(map(len, titles[k * count:(k + 1) * count]), default=0) for k in range(len(rows))]
+    top = line * (len(caption) + 0.4 * bool(caption))
+    height = top + sum(above) + sum(map(sum, rows)) + below
+    page, x, y = figure, 0.0, 0.0
     if figure is None:
-        return plt.figure(figsize=size)
-    if hasattr(figure, "panel"):
-        return figure.panel(*size)
-    figure.clear()
+        page = plt.figure(figsize=(width, height))
+    elif hasattr(figure, "place"):
+        page, x, y = figure.place(width, height)
+    else:
+        page.clear()
+    across, upright = page.get_size_inches()
+    page.text((x + 0.6 * em()) / across, 1.0 - (y + 0.3 * em()) / upright, "\n".join(caption), va="top",
+              parse_math=False, linespacing=1.15)
+    y, axes = y + top, []
+    for (over, high, under), title_room in zip(rows, above):
+        y, at = y + title_room + over, x + inset
+        for left, box, right in columns:
+            axes.append(page.add_axes(((at + left) / across, 1.0 - (y + high) / upright, box / across,
+                                       high / upright)))
+            at += left + box + right
+        y += high + under
+    for k, (of, title) in enumerate(zip(axes, titles)):
+        left, box, _ = columns[k % count]
+        # With a given y, matplotlib does not measure everything above the axes.
+        of.set_title("\n".join(title), loc="left", x=(0.6 * em() - left) / box if count > 1 else 0.0, y=1.0,
+                     parse_math=False, linespacing=1.15)
+    return page, axes
+
+
+def plot(caption="", figure=None, height=0.6, below=0.0):
+    """A picture with one plot, `height` times as high as wide."""
+    left, right, top, bottom = (em() * of for of in AROUND_PLOTS)
+    width = wide(NARROWEST)
+    rows = [(top, max(height * width, min(0.75 * width, 2.8)) - top - bottom, bottom)]
+    figure, (axes,) = canvas([(left, width - left - right, right)], rows, caption, below=below, figure=figure)
+    return figure, axes
+
+
+@dataclass
+class Map:
+    """A map of the body: its title, the corners of its box, (2, 2), a function that draws it into axes, and whether it
+    has a colour bar."""
+
+    title: str
+    box: np.ndarray
+    paint: Callable
+    has_bar: bool = True
+
+
+def draw_maps(maps, caption, units, figure=None, below=0.0):
+    """A picture of maps with one scale, in that number of columns in which they are largest."""
+    left, right, top, bottom = (em() * of for of in AROUND_MAPS)
+    right = BAR * em() if any(of.has_bar for of in maps) else right
+    boxes = [_with_margin(of.box) for of in maps]
+    extent = np.max([np.ptp(box, axis=0) for box in boxes], axis=0)
+    most = wide(7.2 if len(maps) == 1 else 11.0)
+
+    def scale(columns):
+        rows, across = -(-len(maps) // columns), most / columns
+        lines = max(len(wrapped(of.title, across - em())) for of in maps)
+        room = across - left - right, (OPTIONS.height - below) / rows - top - lines * LINE * em() - bottom
+        return (np.array(room) / extent).min()
+
+    count = max(range(1, len(maps) + 1), key=scale)
+    width, height = np.maximum(scale(count), 0.0) * extent
+    rows = -(-len(maps) // count)
+    # Where there is room, narrow maps stand apart, so that their titles are in one line.
+    own, widest = left + width + right, max(width_of(of.title) for of in maps) + em()
+    right += np.clip(widest, own, max(own, most / count)) - own
+    figure, axes = canvas([(left, width, right)] * count, [(top, height, bottom)] * rows, caption,
+                          [of.title for of in maps], below, figure)
+    for of, box, one in zip(maps, boxes, axes):
+        of.paint(one)
+        frame(one, box, units)
+    for one in axes[len(maps):]:
+        one.remove()
     return figure
+
+
+def _with_margin(box):
+    air = 0.05 * np.ptp(box, axis=0).max()
+    return np.array([box[0] - air, box[1] + air])
+
+
+def frame(axes, box, units):
+    """Sets equal aspect around a box, with few ticks."""
+    axes.set_xlim(box[:, 0])
+    axes.set_ylim(box[:, 1])
+    axes.set_aspect("equal", anchor="NW")
+    for axis, name, room, ticks in zip((axes.xaxis, axes.yaxis), "xy", _size_of(axes), (5.0, 2.5)):
+        axis.set_major_locator(MaxNLocator(int(np.clip(room / (ticks * em()), 1, 6)), steps=[1, 2, 5, 10]))
+        axis.set_label_text(f"{name} ({units['length']})")
+
+
+def _size_of(axes):
+    """The width and the height of axes, inches."""
+    return axes.get_position().size * axes.figure.get_size_inches()
+
+
+def headline(results, text):
+    """The caption of a picture: what it shows; above it the run, with its overrides, and how it ended if it ended early.
+    In a report these are elsewhere."""
+    if not OPTIONS.head:
+        return text
+    run = f"{results.title}, with {results.overrides}" if results.overrides else results.title
+    # Two lines of about 90 letters.
+    run = textwrap.shorten(run, 180, placeholder=" …")
+    return "\n".join(filter(None, (run, results.ending, text)))
 
 
 def amplification(size, largest):
@@ -101,46 +240,6 @@ def amplification(size, largest):
         return 1.0
     power = 10.0 ** np.floor(np.log10(wanted))
     return power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12))
-
-
-def headline(results, text):
-    """The title of a figure: the scene with its overrides, a note if the run ended early, and the quantity shown."""
-    overrides = textwrap.shorten(f"with {results.overrides}", 100, placeholder=" …")
-    overrides = overrides.replace("$", r"\$") if results.overrides else ""
-    return "\n".join(filter(None, (results.title, overrides, results.ending, text)))
-
-
-def wrap_titles(figure):
-    """Breaks the lines of titles that are wider than their axes, first of the titles above all axes of a figure or
-    subfigure: these make the axes smaller."""
-    for of_axes in (False, True):
-        figure.get_layout_engine().execute(figure)
-        for part in figure.subfigs or [figure]:
-            for axes in part.axes:
-                axes.apply_aspect()
-            boxes = [axes.get_window_extent() for axes in part.axes]
-            if of_axes:
-                for axes, box in zip(part.axes, boxes):
-                    _wrap(axes.title, box.width)
-            elif part._suptitle:
-                _wrap(part._suptitle, max(box.x1 for box in boxes) - min(box.x0 for box in boxes))
-
-
-def _wrap(title, room):
-    """Breaks the lines of a title into parts that are about equally long, until it is not wider than `room`, pixels."""
-    lines = title.get_text().split("\n")
-    letters = max(map(len, lines))
-    while (width := title.get_window_extent().width) > room and letters > SHORTEST:
-        letters = min(letters - 1, int(letters * room / width) + 1)
-        parts = [max(1, -(-len(line) // letters)) for line in lines]
-        rooms = [min(letters, len(line) // part + 8) for line, part in zip(lines, parts)]
-        title.set_text("\n".join(textwrap.fill(line, room, break_long_words=False) for line, room in zip(lines, rooms)))
-
-
-def map_size(extent, across):
-    """The size, inches, of a map with equal aspect that is `across` wide including ticks and labels."""
-    least, most = (1.4, 1.2 * WIDTH) if WIDTH else (2.2, 8.0)
-    return across, float(np.clip((across - 1.0) * extent[1] / extent[0] + 0.9, least, most))
 
 
 def draw_outline(axes, points, results, **style):
@@ -162,35 +261,14 @@ def draw_foundation(axes, results, factor=None):
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
 
 
-def frame(axes, points, units):
-    """Sets equal aspect around `points`, with margins and few ticks."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    air = 0.05 * max(high - low)
-    axes.set_xlim(low[0] - air, high[0] + air)
-    axes.set_ylim(low[1] - air, high[1] + air)
-    axes.set_aspect("equal")
-    axes.xaxis.set_major_locator(MaxNLocator(5 if WIDTH else 6, steps=[1, 2, 5, 10]))
-    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
-    axes.set_xlabel(f"x ({units['length']})")
-    axes.set_ylabel(f"y ({units['length']})")
-
-
-def draw_colourbar(axes, image, label, extend="neither", flat=False):
-    """Draws a colour bar as high as the map. Beside a flat body there is no room for the label, which is below it."""
-    bar = axes.figure.colorbar(image, cax=axes.inset_axes([1.03, 0.0, 0.035, 1.0]), extend=extend)
+def draw_colourbar(axes, image, extend="neither"):
+    """Draws a colour bar as high as the map."""
+    width, height = _size_of(axes)
+    place = axes.inset_axes([1.0 + 0.8 * em() / width, 0.0, em() / width, 1.0])
+    ticks = MaxNLocator(int(np.clip(height / (2.5 * em()), 1, 6)), steps=[1, 2, 5, 10])
+    bar = axes.figure.colorbar(image, cax=place, extend=extend, ticks=ticks)
     bar.outline.set_linewidth(0.5)
     bar.formatter.set_useOffset(False)
-    if flat:
-        axes.annotate(label, (1.08, 0.0), (0.0, -2.4 * plt.rcParams["font.size"]), xycoords="axes fraction",
-                      textcoords="offset points", ha="right", va="top", fontsize="small")
-    else:
-        bar.set_label(label)
-
-
-def is_flat(results):
-    """Whether the body is much wider than high."""
-    width, height = np.ptp(results.nodes, axis=0)
-    return height < 0.3 * width
 
 
 def stress_unit(largest, units):
@@ -203,32 +281,25 @@ def stress_unit(largest, units):
     return 1.0, units["stress"]
 
 
-# What figures show of the damage: "zeta", "loss", or None to choose.
-DAMAGE = None
-# The column of history.csv over which forces are drawn, or None to choose.
-ABSCISSA = None
-# Whether maps have contour lines.
-CONTOURS = False
-# The smallest and the largest stress of the colours, Pa, or None to choose.
-RANGE = None
-
-
 def mesh_of(results, points):
     """The flat pieces of the shown elements, for these positions of the nodes."""
     hidden = np.repeat(~results.shown, results.pieces.cuts**2)
     return Triangulation(*results.pieces.at_points(points).T, results.pieces.triangles, hidden)
 
 
-def draw_stress(axes, mesh, results, stress, name, top):
-    """Colours the body by a stress from 0 to `top`, or in RANGE, with a colour bar. Returns the factor and the unit of
-    the numbers, and the top."""
-    low, top = RANGE or (0.0, top)
-    factor, unit = stress_unit(top, results.units)
+def stress_colours(results, top):
+    """The smallest and the largest stress of the colours, and the factor and the unit of their numbers."""
+    low, top = OPTIONS.range or (0.0, top)
+    return low, top, *stress_unit(top, results.units)
+
+
+def draw_stress(axes, mesh, results, stress, top):
+    """Colours the body by a stress from 0 to `top`, or in the range asked for, with a colour bar."""
+    low, top, factor, _ = stress_colours(results, top)
     image = draw_values(axes, mesh, results.pieces.at_points(stress) / factor, "viridis", low / factor,
                         top / factor or 1.0)
     extend = {(0, 1): "max", (1, 0): "min", (1, 1): "both"}.get((stress.min() < low, stress.max() > top), "neither")
-    draw_colourbar(axes, image, f"{name} ({unit})", extend, is_flat(results))
-    return factor, unit, top
+    draw_colourbar(axes, image, extend)
 
 
 def draw_values(axes, mesh, values, colours, low, high):
@@ -237,27 +308,46 @@ def draw_values(axes, mesh, values, colours, low, high):
     image = TriMesh(mesh, cmap=colours, norm=Normalize(low, high), rasterized=True)
     image.set_array(values)
     axes.add_collection(image, autolim=False)
-    if CONTOURS and high > low:
+    if OPTIONS.contours and high > low:
         axes.tricontour(mesh, values, levels=np.linspace(low, high, 9)[1:-1], colors="white", linewidths=0.6, zorder=2)
     return image
 
 
-def damage_scale(least, largest):
-    """How to show ζ between two values: the function that is drawn, its label, colour map and limits. As in all
-    figures, dark colours are low values.
+def room_for_legend(labels, always=False):
+    """The height of a legend below a plot, inches; 0 for a legend inside it."""
+    if not labels or not always and len(labels) <= 4 and max(map(width_of, labels)) < 0.3 * wide(NARROWEST):
+        return 0.0
+    columns, lines = legend_columns(labels, wide(NARROWEST)), [label.count("\n") + 1 for label in labels]
+    return 1.4 * em() * (sum(max(lines[k:k + columns]) for k in range(0, len(lines), columns)) + 0.5)
 
-    If ζ is close to 1, the loss 1 − ζ is shown, in a power of ten, unless DAMAGE says otherwise. If ζ is uniform, the
-    limits are moved apart, so that the colours do not show rounding errors.
-    """
-    low, high = 1.0 - largest, 1.0 - least
-    uniform = high - low <= 1e-9 * high
-    if 0.0 < high and DAMAGE != "zeta" and (high < 0.1 or DAMAGE == "loss"):
-        unit = 10.0 ** np.floor(np.log10(high))
-        label = rf"damage  $1 - \zeta$  ($\times 10^{{{np.log10(unit):.0f}}}$)"
-        limits = (0.0, 10.0) if uniform else (low / unit, high / unit)
-        return lambda zeta: (1.0 - zeta) / unit, label, "magma", limits
-    limits = (0.0, 1.0) if uniform else (least, largest)
-    return lambda zeta: zeta, r"damage field  $\zeta$", "magma", limits
+
+def legend_columns(labels, width):
+    """The number of columns of a legend, inches wide."""
+    widest = max(width_of(line) for label in labels for line in label.split("\n"))
+    return max(1, min(len(labels), int(width / (widest + 3 * em()))))
+
+
+def legend(axes, below, **style):
+    """A legend inside axes, or in the place `below` them, inches."""
+    if not below:
+        axes.legend(loc="best", **style)
+        return
+    size, left = _size_of(axes), AROUND_PLOTS[0] * em()
+    columns = legend_columns(axes.get_legend_handles_labels()[1], wide(NARROWEST))
+    axes.legend(loc="upper left", bbox_to_anchor=((0.6 * em() - left) / size[0], -3.8 * em() / size[1]), ncols=columns,
+                borderaxespad=0.0, borderpad=0.0, fontsize="small", labelspacing=0.3, handletextpad=0.4,
+                columnspacing=1.0, **{"handlelength": 1.6, **style})
+
+
+def power_of(largest):
+    """The power of ten in which values up to `largest` are written: 0 for values between 0.1 and 1e5."""
+    return 0 if 0.1 <= largest < 1e5 or not largest > 0.0 else int(np.floor(np.log10(largest)))
+
+
+def times_power(power, unit=""):
+    """A unit with a power of ten: ` (10⁻³ m)`; "" for 1."""
+    text = " ".join(filter(None, (f"10{str(power).translate(SUPERSCRIPTS)}" if power else "", unit)))
+    return f" ({text})" if text else ""
 
 
 def least_zeta(low):
@@ -274,4 +364,4 @@ def along(points, units):
         if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):
             return points[:, k], f"{name} ({unit}) along {other} = {points[0, 1 - k]:g}"
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength along $\\Gamma_C$ ({unit})"
+    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength ({unit})"

@@ -8,8 +8,10 @@ deformed       the deformed mesh over the initial outline (Figures 5 and 8)
 stress-damage  von Mises stress and damage (Figures 6 and 9)
 principal-stresses  tension and compression with their directions
 pressure       contact pressure and gap along Γ_C
-damage-history the minimum and the mean of ζ in time, if there is damage
+damage-history the largest and the mean damage 1 − ζ in time, if there is damage
 force-displacement  the forces on the supports over the largest displacement, or over time if this does not grow
+
+--only pressure,setting draws only these. With --together: one force-displacement of all runs.
 
 With --line or --along: curves of fields at several times, of one or more runs, with their numbers as CSV.
 
@@ -28,9 +30,9 @@ from math import inf, isfinite
 import drawing
 from animation import FRAMES, MOVIES, animate
 from contact_pressure import draw_evolution, draw_pressure
-from histories import draw_damage_history, draw_force_displacement
+from histories import draw_damage_history, draw_force_displacement, draw_forces
 from limits import box_of, limits_of
-from lines import draw_curves
+from lines import differences, draw_curves
 from maps import draw_deformed, draw_mesh, draw_stress_and_damage
 from paraview_script import write_script
 from principal import draw_principal
@@ -78,8 +80,10 @@ def arguments_of(prog):
         "times of the curves, s (default: the last frame)"))
     parser.add_argument("--no-title", action="store_true", help="without titles, for papers")
     parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every figure")
-    parser.add_argument("--damage", choices=("zeta", "loss"), help=(
-        "draw ζ, as the paper does, or the loss 1 − ζ (default: ζ if it falls below 0.9)"))
+    parser.add_argument("--only", type=lambda text: text.split(","), default=list(FIGURES), metavar="NAME,…", help=(
+        "only these pictures, by the names above"))
+    parser.add_argument("--together", action="store_true", help=(
+        "only force-displacement-together, the forces of all runs in one picture, into the first folder"))
     parser.add_argument("--abscissa", metavar="COLUMN", help=(
         "column of history.csv over which force-displacement draws the forces: time, displacement_max, work, …"))
     parser.add_argument("--range", type=numbers(2), metavar="A,B", help="stresses at the ends of the colour bars, Pa; compression is positive")
@@ -97,6 +101,8 @@ def arguments_of(prog):
     arguments = parser.parse_args()
     if unknown := set(arguments.format) - set(FORMATS):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
+    if unknown := set(arguments.only) - set(FIGURES):
+        parser.error(f"--only: {', '.join(sorted(unknown))} is none of {', '.join(FIGURES)}")
     if arguments.line and arguments.along:
         parser.error("--line and --along: give one of them")
     if (arguments.times or arguments.quantity) and not (arguments.line or arguments.along):
@@ -120,17 +126,6 @@ def numbers(count):
         return values
 
     return parse
-
-
-def styled(figure, arguments):
-    """Applies --no-title, or fits the titles."""
-    if figure is not None and arguments.no_title:
-        figure.suptitle("")
-        for axes in figure.axes:
-            axes.set_title("")
-    elif figure is not None:
-        drawing.wrap_titles(figure)
-    return figure
 
 
 def tell(path):
@@ -163,16 +158,14 @@ def draw(results, limits, arguments):
         tell(write_script(results, limits_of(chosen, arguments.factor)))
         return
     last = replace(results, time=results.frames[-1][0])
-    for name, figure in FIGURES.items():
-        of = last if name in OF_ALL_TIMES else results
-        save(styled(figure(results, limits), arguments), of, name, arguments.format)
+    for name in arguments.only:
+        save(FIGURES[name](results, limits), last if name in OF_ALL_TIMES else results, name, arguments.format)
     if arguments.mesh:
-        save(styled(draw_mesh(results), arguments), last, "mesh", arguments.format)
+        save(draw_mesh(results), last, "mesh", arguments.format)
     if arguments.evolution:
         stride = 1 + len(results.frames) // EVOLUTION
         chosen = states(results, results.frames[::stride])
-        evolution = styled(draw_evolution(chosen, limits_of(chosen)), arguments)
-        save(evolution, last, "contact-evolution", arguments.format)
+        save(draw_evolution(chosen, limits_of(chosen)), last, "contact-evolution", arguments.format)
     if arguments.animate:
         for path in animate(results, arguments.factor, arguments.animate):
             tell(path)
@@ -181,16 +174,14 @@ def draw(results, limits, arguments):
 def main(prog=None):
     """Returns the exit code: 2 if a figure could not be drawn. A message names it."""
     arguments = arguments_of(prog)
-    if arguments.width:
-        drawing.set_width(arguments.width)
+    drawing.use(width=arguments.width, titles=not arguments.no_title, contours=arguments.contours,
+                abscissa=arguments.abscissa, range=arguments.range)
     arguments.folders = folders_of(arguments.folders)
     if arguments.line or arguments.along:
         with telling() as problems:
-            for path in draw_curves(arguments, styled):
+            for path in draw_curves(arguments):
                 tell(path)
         return 2 if problems else 0
-    drawing.DAMAGE, drawing.CONTOURS, drawing.ABSCISSA = arguments.damage, arguments.contours, arguments.abscissa
-    drawing.RANGE = arguments.range
     runs, failed = [], False
     for folder in arguments.folders:
         with telling() as problems:
@@ -200,6 +191,11 @@ def main(prog=None):
                 print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",
                       file=sys.stderr)
         failed |= bool(problems)
+    if arguments.together:
+        with telling() as problems:
+            names = differences([run.folder.name for run in runs])
+            save(draw_forces(runs, names), runs[0], "force-displacement-together", arguments.format)
+        return 2 if failed or problems else 0
     for results in runs:
         with telling() as problems:
             # Only numbers in the same units can have a common scale.

@@ -2,77 +2,98 @@
 
 from itertools import cycle
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import ScalarFormatter
 
-import drawing
-from drawing import BLUE, FAINT, RED, canvas, headline, wide
+from drawing import (
+    AROUND_PLOTS, BLUE, FAINT, OPTIONS, RED, canvas, em, headline, legend, plot, power_of, room_for_legend,
+    times_power,
+)
 from results import ROUNDING, UNDAMAGED, ResultError
 
-
 # Names of abscissas; others are columns of history.csv.
-NAMES = {"time": "time t ({time})", "displacement_max": "largest displacement ({length})",
-         "work": "work of the loads ({work})"}
+NAMES = {"time": ("time t", "time"), "displacement_max": ("largest displacement", "length"),
+         "work": ("work of the loads", "work")}
+DASHES = "-", (0, (4, 3)), (0, (1, 2))
 
 
 def draw_damage_history(results, _limits=None, figure=None):
-    """Draws min ζ and mean ζ in time, and the time at which ζ reached ζ_*."""
+    """Draws the largest and the mean damage 1 − ζ in time, and the time at which ζ reached ζ_*."""
     time, least = results.history.get("time"), results.history.get("zeta_min")
     if time is None or least is None or len(time) < 3 or np.nanmin(least) >= 1.0 - UNDAMAGED:
         return None
-    figure = canvas((wide(6.4), max(2.8, 0.6 * wide(6.4))), figure)
-    axes = figure.add_subplot()
-    axes.plot(time, results.history["zeta_mean"], color=FAINT, linewidth=1.4, label="mean ζ")
-    axes.plot(time, least, color=BLUE, linewidth=1.8, label="min ζ")
     stopped = results.summary.get("stopped_at")
-    reached = "collapse" if results.summary.get("stopped_by") == "collapse" else "ζ$_*$ reached"
+    reached = "collapse" if results.summary.get("stopped_by") == "collapse" else "ζ_* reached"
+    labels = ["mean", "largest"]
+    labels += [] if stopped is None else [f"{reached} at t = {results.stopping_time} {results.units['time']}"]
+    below, power = room_for_legend(labels), power_of(1.0 - np.nanmin(least))
+    figure, axes = plot(headline(results, "damage 1 − ζ in time"), figure, below=below)
+    axes.plot(time, (1.0 - results.history["zeta_mean"]) / 10.0**power, color=FAINT, linewidth=1.4, label=labels[0])
+    axes.plot(time, (1.0 - least) / 10.0**power, color=BLUE, linewidth=1.8, label=labels[1])
     if stopped is not None:
-        axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)),
-                     label=f"{reached} at t = {results.stopping_time} {results.units['time']}")
-        axes.set_ylim(bottom=0.0)
+        axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)), label=labels[2])
+    axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
-    axes.yaxis.set_major_formatter(ScalarFormatter(useOffset=False))
+    axes.locator_params("x", nbins=5)
     axes.set_xlabel(f"time t ({results.units['time']})")
-    axes.set_ylabel("damage field ζ")
-    axes.set_title(headline(results, ""))
-    axes.legend(loc="lower left")
+    axes.set_ylabel(f"damage 1 − ζ{times_power(power)}")
+    legend(axes, below)
     return figure
 
 
 def draw_force_displacement(results, _limits=None, figure=None):
-    """Draws the force of each support, its component along the direction that it has where it is largest, over the
-    column ABSCISSA. By default this is the largest displacement if it grows in all steps, else the time."""
-    history = results.history
-    supports = [name.removesuffix(".force_x") for name in history if name.endswith(".force_x")]
-    forces = {name: _along_largest(history[f"{name}.force_x"], history[f"{name}.force_y"]) for name in supports}
-    largest = max((np.nanmax(force, initial=0.0) for force in forces.values()), default=0.0)
-    if largest <= 0.0 or len(history["time"]) < 3:
+    """Draws the force of each support; see `draw_forces`."""
+    return draw_forces([results], [""], figure)
+
+
+def draw_forces(runs, names, figure=None):
+    """Draws the force of each support of one or more runs, its component along the direction that it has where it is
+    largest, over a column of history.csv. By default this is the largest displacement if it grows in all steps of all
+    runs, else the time."""
+    forces = [_forces(results.history) for results in runs]
+    largest = max((np.nanmax(force, initial=0.0) for of in forces for force in of.values()), default=0.0)
+    if largest <= 0.0 or max(len(results.history["time"]) for results in runs) < 3:
         return None
-    if drawing.ABSCISSA not in (None, *history):
-        raise ResultError(f"history.csv has no column {drawing.ABSCISSA}; it has {', '.join(history)}")
-    reached = history["displacement_max"]
-    # Over displacements that start near their end the curves would be short.
-    grows = (np.diff(reached) >= -ROUNDING * reached.max()).all() and reached[0] < 0.5 * reached[-1]
-    abscissa = drawing.ABSCISSA or ("displacement_max" if grows else "time")
-    figure = canvas((wide(6.4), max(2.8, 0.6 * wide(6.4))), figure)
-    axes = figure.add_subplot()
-    shown = {name: force for name, force in forces.items() if np.nanmax(force) > ROUNDING * largest}
-    # Dashes show a curve under another one.
-    for (name, force), dashes in zip(shown.items(), cycle(("-", (0, (4, 3)), (0, (1, 2))))):
-        axes.plot(history[abscissa], force, linewidth=1.6, linestyle=dashes, label=name.replace("$", r"\$"))
-    if np.nanmin(history[abscissa]) >= 0.0:
+    for results in runs:
+        if OPTIONS.abscissa not in (None, *results.history):
+            raise ResultError(f"history.csv has no column {OPTIONS.abscissa}; it has {', '.join(results.history)}")
+    over = OPTIONS.abscissa or (
+        "displacement_max" if all(_grows(results.history["displacement_max"]) for results in runs) else "time")
+    # Runs have colours, and supports dashes; the supports of a single run have both.
+    curves = [(", ".join(filter(None, (name, support))).replace("$", r"\$"), results.history[over], force, k)
+              for k, (results, name, of) in enumerate(zip(runs, names, forces))
+              for support, force in of.items() if np.nanmax(force) > ROUNDING * largest]
+    labels = [label for label, *_ in curves]
+    below = room_for_legend(labels)
+    text = "forces on the supports" if len(runs) > 1 else headline(runs[0], "forces on the supports")
+    figure, axes = plot(text, figure, below=below)
+    dashes, reached = cycle(DASHES), max(np.nanmax(np.abs(abscissa)) for _, abscissa, *_ in curves)
+    across, up = power_of(reached), power_of(largest)
+    for number, (label, abscissa, force, k) in enumerate(curves):
+        axes.plot(abscissa / 10.0**across, force / 10.0**up, linewidth=1.6, linestyle=next(dashes), label=label,
+                  color=f"C{(k if len(runs) > 1 else number) % 10}")
+    if min(np.nanmin(abscissa) for _, abscissa, *_ in curves) >= 0.0:
         axes.set_xlim(left=0.0)
-    if min(map(np.nanmin, shown.values())) < -ROUNDING * largest:
+    if min(np.nanmin(force) for _, _, force, _ in curves) < -ROUNDING * largest:
         axes.axhline(0.0, color=FAINT, linewidth=0.7)
     else:
         axes.set_ylim(bottom=0.0)
     axes.locator_params("x", nbins=5)
-    axes.set_xlabel(NAMES.get(abscissa, abscissa).format(**results.units))
-    axes.set_ylabel("force on the support ({line})".format(**results.units))
-    axes.set_title(headline(results, ""))
-    axes.legend(loc="best")
+    name, kind = NAMES.get(over, (over, ""))
+    axes.set_xlabel(f"{name}{times_power(across, runs[0].units.get(kind, ''))}")
+    axes.set_ylabel(f"force{times_power(up, runs[0].units['line'])}")
+    legend(axes, below)
     return figure
+
+
+def _forces(history):
+    """The force of each support along the direction that it has where it is largest."""
+    names = [name.removesuffix(".force_x") for name in history if name.endswith(".force_x")]
+    return {name: _along_largest(history[f"{name}.force_x"], history[f"{name}.force_y"]) for name in names}
+
+
+def _grows(reached):
+    """Whether values grow in all steps. Over displacements that start near their end the curves would be short."""
+    return (np.diff(reached) >= -ROUNDING * reached.max()).all() and reached[0] < 0.5 * reached[-1]
 
 
 def _along_largest(x, y):
@@ -105,9 +126,10 @@ def draw_histories(results):
         return None
     panels = [(title, {k: v for k, v in columns.items() if k in history}, is_log) for title, columns, is_log in PANELS]
     panels = [panel for panel in panels if any(np.nanmax(history[k]) > 0.0 for k in panel[1])]
-    rows = (len(panels) + 1) // 2
-    figure, grid = plt.subplots(rows, 2, figsize=(9.6, 2.1 * rows), sharex=True, squeeze=False)
-    for axes, (title, columns, is_log) in zip(grid.flat, panels):
+    left, right, top, bottom = (em() * of for of in AROUND_PLOTS)
+    figure, grid = canvas([(left, 4.8 - left - right, right)] * 2, [(top, 1.3, bottom)] * ((len(panels) + 1) // 2),
+                          titles=[title.format(**results.units) for title, *_ in panels])
+    for axes, (title, columns, is_log) in zip(grid, panels):
         for column, name in columns.items():
             values = history[column]
             largest = np.nanmax(np.abs(values))
@@ -117,12 +139,10 @@ def draw_histories(results):
                 values = np.where(np.abs(values) <= ROUNDING * largest, 0.0, values)
             if np.isfinite(values).any():
                 axes.plot(history["time"], values, linewidth=1.2, label=name)
-        axes.set_title(title.format(**results.units), fontsize=9.5)
         axes.set_yscale("log" if is_log else "linear")
+        axes.set_xlabel(f"time t ({results.units['time']})")
         if any(columns.values()):
             axes.legend(fontsize=8, ncols=2, loc="best")
-    for axes in grid.flat[len(panels):]:
-        axes.set_visible(False)
-    for axes in grid[-1]:
-        axes.set_xlabel(f"time t ({results.units['time']})")
+    for axes in grid[len(panels):]:
+        axes.remove()
     return figure

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drawing import amplification
+from setting import largest_load
 
 
 @dataclass
@@ -14,14 +15,15 @@ class Limits:
     factor: float  # amplification of displacements
     box: np.ndarray  # (2, 2): corners of a box around the bodies before and after deformation, m
     stress: float  # the top of the colours, Pa
-    zeta: tuple  # minimum and maximum
+    damage: float  # the largest 1 − ζ
     pressure: float  # the top of the pressures on Γ_C, Pa
     gap: float  # the largest of Γ_C, m
+    load: float  # the largest traction, Pa
 
     @property
-    def damaged(self):
+    def is_damaged(self):
         """Whether the damage is visible."""
-        return self.zeta[0] < 1.0
+        return self.damage > 0.0
 
 
 def _exceeded_in(part, values, sizes):
@@ -61,9 +63,10 @@ def limits_of(states, factor=None):
         factor=factor,
         box=box_of(states, factor),
         stress=float(top),
-        zeta=(min(s.zeta.min() for s in states), max(s.zeta.max() for s in states)),
+        damage=float(max(1.0 - state.zeta.min() for state in states)),
         pressure=max(_pressure_top(state) for state in states),
         gap=max((curve.gap.max() for state in states for curve in state.curves), default=0.0),
+        load=max(largest_load(state) for state in states),
     )
 
 

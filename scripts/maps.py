@@ -1,62 +1,145 @@
 """Pictures of the whole body: its deformed mesh, stress and damage."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
 from bars import three_digits
 from drawing import (
-    BLUE, INK, RED, canvas, damage_scale, draw_colourbar, draw_foundation, draw_outline, draw_stress, draw_values,
-    frame, headline, is_flat, least_zeta, map_size, mesh_of, panels_of, wide,
+    BLUE, INK, OPTIONS, RED, Map, draw_colourbar, draw_foundation, draw_maps, draw_outline, draw_stress, draw_values,
+    headline, least_zeta, mesh_of, power_of, stress_colours, times_power,
 )
+from principal import principal_maps
+from setting import ARROW, draw_loads
 
 # About so many arrows along the boundary.
 ARROWS = 30
 
 
 def draw_deformed(results, limits, figure=None):
-    """The deformed mesh over the initial outline and the foundation (paper, Figures 5 and 8).
-
-    The obstacle is drawn opposite the nodes of Γ_C. As these slide, the obstacle seems to slide with them.
-    """
-    pieces = results.pieces
-    moved = results.nodes + limits.factor * results.displacement
-    extent = np.ptp(limits.box, axis=0)
-    width, height = map_size(extent, wide(7.2))
-    figure = canvas((width, height + 0.4), figure)
-    axes = figure.add_subplot()
-    mesh = Triangulation(*pieces.at_points(moved).T, pieces.triangles)
-    draw_values(axes, mesh, np.zeros(len(mesh.x)), ListedColormap(["#dfe9f3"]), 0.0, 0.0)
-    _draw_sides(axes, pieces, moved, width / extent[0])
-    draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
-    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
-    draw_foundation(axes, results, limits.factor)
-    _draw_fall(axes, results, moved)
-    frame(axes, limits.box, results.units)
-    text = f"deformed mesh at {results.moment}, {_amplified(results, limits)}"
-    text += "" if results.unloaded else "; dashed: initial outline"
-    axes.set_title(headline(results, text))
-    return figure
+    """The deformed mesh over the initial outline and the foundation (paper, Figures 5 and 8)."""
+    caption = headline(results, f"deformed mesh at {results.moment}")
+    return draw_maps([deformed_map(results, limits)], caption, results.units, figure)
 
 
-def draw_mesh(results):
+def draw_mesh(results, figure=None):
     """The undeformed mesh."""
-    extent = np.ptp(results.nodes, axis=0)
-    width, height = map_size(extent, wide(7.2))
-    figure, axes = plt.subplots(figsize=(width, height + 0.4))
-    _draw_sides(axes, results.pieces, results.nodes, width / extent[0])
-    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9)
-    frame(axes, results.nodes, results.units)
-    axes.set_title(headline(results, f"mesh: {len(results.pieces.elements)} triangles"))
-    return figure
+    def paint(axes):
+        _draw_sides(axes, results.pieces, results.nodes)
+        draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9)
+
+    caption = headline(results, f"mesh: {len(results.pieces.elements)} triangles")
+    return draw_maps([Map("", _box(results), paint, has_bar=False)], caption, results.units, figure)
 
 
-def _draw_sides(axes, pieces, points, scale):
+def draw_stress_and_damage(results, limits, figure=None):
+    """Von Mises stress beside the damage field, on the initial configuration (Figures 6 and 9).
+
+    For an undamaged body only the stress is drawn.
+    """
+    maps = [von_mises_map(results, limits)] + [damage_map(results, limits)] * limits.is_damaged
+    return draw_maps(maps, headline(results, _with_circle(results, results.part)), results.units, figure)
+
+
+def draw_everything(results, limits, figure=None):
+    """The maps of all other pictures in one."""
+    maps = [deformed_map(results, limits), von_mises_map(results, limits), *(principal_maps(results) or ())]
+    maps[2:2] = [damage_map(results, limits)] * limits.is_damaged
+    return draw_maps(maps, headline(results, _with_circle(results, f"maps at {results.part}")), results.units, figure)
+
+
+def draw_state(results, limits, figure=None):
+    """The deformed body under its loads, coloured by its damage, or by its stress where there is no damage."""
+    moved = results.nodes + limits.factor * results.displacement
+    coloured = (damage_map if limits.is_damaged else von_mises_map)(results, limits, moved)
+
+    def paint(axes):
+        coloured.paint(axes)
+        draw_outline(axes, results.nodes, results, color=INK, linewidth=0.6, linestyle=(0, (4, 2)), zorder=0)
+        draw_loads(axes, results, limits.load, limits.factor)
+
+    # Pressing loads are outside the body.
+    beyond = ARROW * results.size * (limits.load > 0.0) * np.array([[-1.0], [1.0]])
+    caption = headline(results, f"{results.part}, {_amplified(results, limits)}")
+    return draw_maps([Map(coloured.title, limits.box + beyond, paint)], caption, results.units, figure)
+
+
+def deformed_map(results, limits):
+    """The deformed mesh, the initial outline and the foundation.
+
+    The obstacle is drawn opposite the nodes of Γ_C. Where displacements are amplified it seems to slide with them.
+    """
+    moved = results.nodes + limits.factor * results.displacement
+
+    def paint(axes):
+        mesh = Triangulation(*results.pieces.at_points(moved).T, results.pieces.triangles)
+        draw_values(axes, mesh, np.zeros(len(mesh.x)), ListedColormap(["#dfe9f3"]), 0.0, 0.0)
+        _draw_sides(axes, results.pieces, moved)
+        draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
+        draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
+        draw_foundation(axes, results, limits.factor)
+        _draw_fall(axes, results, moved)
+
+    title = _amplified(results, limits) if OPTIONS.titles else ""
+    return Map(title, limits.box, paint, has_bar=False)
+
+
+def von_mises_map(results, limits, at=None):
+    """The von Mises stress, with the nodes `at` these places."""
+    *_, factor, unit = stress_colours(results, limits.stress)
+    title, largest, is_singular = f"von Mises stress ({unit})", results.von_mises.max(), bool(results.singular())
+    if OPTIONS.titles:
+        said = results.said("von_mises_max", largest, factor)
+        title += f", largest {said}" + ": singular (circle)" * (is_singular and largest > 0.0)
+    at = results.nodes if at is None else at
+
+    def paint(axes):
+        draw_stress(axes, mesh_of(results, at), results, results.von_mises, limits.stress)
+        _draw_body(axes, results, at, limits)
+        if is_singular and largest:
+            axes.plot(*at[results.von_mises.argmax()], marker="o", markersize=9, fillstyle="none", color=RED, zorder=5)
+
+    return Map(title, _box(results), paint)
+
+
+def damage_map(results, limits, at=None):
+    """The damage 1 − ζ from 0, sound, to the largest of the states, with the nodes `at` these places."""
+    power = power_of(limits.damage)
+    title = f"damage 1 − ζ{times_power(power)}"
+    if OPTIONS.titles:
+        title += f", least ζ {results.said('zeta_min', results.zeta.min(), plain=least_zeta)}"
+    at = results.nodes if at is None else at
+
+    def paint(axes):
+        damage = (1.0 - results.pieces.at_points(results.zeta)) / 10.0**power
+        draw_colourbar(axes, draw_values(axes, mesh_of(results, at), damage, "magma", 0.0, limits.damage / 10.0**power))
+        _draw_body(axes, results, at, limits)
+
+    return Map(title, _box(results), paint)
+
+
+def _draw_body(axes, results, at, limits):
+    """The outline and the foundation, for nodes that are not displaced, or by the amplification of the picture."""
+    draw_outline(axes, at, results, color=INK, linewidth=0.7)
+    draw_foundation(axes, results, None if at is results.nodes else limits.factor)
+
+
+def _box(results):
+    return np.array([results.nodes.min(axis=0), results.nodes.max(axis=0)])
+
+
+def _with_circle(results, text):
+    cause = results.singular()
+    return f"{text}; circle: singular at {cause}" if cause else text
+
+
+def _draw_sides(axes, pieces, points):
     """Draws the sides of all elements as one line with breaks. Its width follows the mean edge, so that it does not fill
-    a fine mesh; a metre is `scale` inches long."""
+    a fine mesh."""
     sides = np.pad(pieces.along(pieces.sides(), points), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
-    edge = 72 * scale * np.sqrt(np.ptp(points, axis=0).prod() / len(pieces.elements))
+    across = 72 * axes.figure.get_size_inches()[0] * axes.get_position().width
+    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    edge = across / extent[0] * np.sqrt(extent.prod() / len(pieces.elements))
     axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
 
 
@@ -70,75 +153,11 @@ def _draw_fall(axes, results, moved):
                     scale_units="xy", scale=1.0, width=0.004, zorder=4)
 
 
-def draw_stress_and_damage(results, limits, figure=None):
-    """Von Mises stress beside the damage field, on the initial configuration (Figures 6 and 9).
-
-    For an undamaged body only the stress is drawn.
-    """
-    extent = np.ptp(results.nodes, axis=0)
-    size, shape = panels_of(extent)
-    if not limits.damaged:
-        width, height = map_size(extent, wide(6.9) - 0.9)
-        size, shape = (width + 0.9, height + 0.5), (1, 1)
-    figure, mesh = canvas(size, figure), mesh_of(results, results.nodes)
-    panels = figure.subplots(*shape, squeeze=False).flat
-    for axes, paint in zip(panels, (_paint_stress, _paint_damage)):
-        axes.set_title(paint(axes, mesh, results, limits))
-    for axes in figure.axes:
-        draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
-        draw_foundation(axes, results)
-        frame(axes, results.nodes, results.units)
-    cause = results.singular()
-    text = f"{results.part}; circle: {cause}, the stress grows as the mesh is refined" if cause else results.part
-    figure.suptitle(headline(results, text))
-    return figure
-
-
-def draw_state(results, limits, figure=None):
-    """The deformed body coloured by its damage, or by its stress where there is no damage."""
-    width, height = map_size(np.ptp(limits.box, axis=0), 7.2)
-    figure = canvas((width, height + 0.4), figure)
-    axes = figure.add_subplot()
-    moved = results.nodes + limits.factor * results.displacement
-    mesh = mesh_of(results, moved)
-    paint = _paint_damage if limits.damaged else _paint_stress
-    shown = paint(axes, mesh, results, limits)
-    draw_outline(axes, moved, results, color=INK, linewidth=0.7)
-    draw_outline(axes, results.nodes, results, color=INK, linewidth=0.6, linestyle=(0, (4, 2)), zorder=0)
-    draw_foundation(axes, results, limits.factor)
-    frame(axes, limits.box, results.units)
-    text = f"{results.part}: {shown}\n{_amplified(results, limits)}"
-    axes.set_title(headline(results, text))
-    return figure
-
-
 def _amplified(results, limits):
     """The amplification in words."""
-    largest = np.linalg.norm(results.displacement, axis=1).max()
-    largest = results.barred("displacement_max", largest) or three_digits(largest)
     if results.unloaded:
         return "unloaded"
+    largest = results.said("displacement_max", np.linalg.norm(results.displacement, axis=1).max())
     what = "displacements and gaps" if len(results.contact) else "displacements"
     scale = "to scale" if limits.factor == 1.0 else f"× {limits.factor:g}"
-    return f"{what} {scale} (largest {largest} {results.units['length']})"
-
-
-def _paint_stress(axes, mesh, results, limits):
-    """Draws the von Mises stress with a colour bar; returns the text for the title."""
-    factor, unit, _ = draw_stress(axes, mesh, results, results.von_mises, "von Mises stress", limits.stress)
-    largest = results.von_mises.max()
-    text = f"von Mises stress, largest {three_digits(largest / factor)} {unit}"
-    if not results.singular() or not largest:
-        return text
-    at = results.nodes[results.von_mises.argmax()]
-    axes.plot(*at, marker="o", markersize=9, fillstyle="none", color=RED, zorder=5)
-    return f"{text}: singular (circle)"
-
-
-def _paint_damage(axes, mesh, results, limits):
-    """Draws ζ with a colour bar; returns the text for the title."""
-    shown, label, colours, (low, high) = damage_scale(*limits.zeta)
-    image = draw_values(axes, mesh, results.pieces.at_points(shown(results.zeta)), colours, low, high)
-    draw_colourbar(axes, image, label, flat=is_flat(results))
-    least = results.zeta.min()
-    return rf"damage, least $\zeta$ = {results.barred('zeta_min', least) or least_zeta(least)}"
+    return f"{what} {scale}, largest {largest} {results.units['length']}"

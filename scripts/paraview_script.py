@@ -12,7 +12,7 @@ def write_script(results, limits):
         "time": results.time,
         "size": results.size,
         "factor": float(limits.factor),
-        "damage": float(1.0 - limits.zeta[0]),
+        "damage": limits.damage,
         "stress_unit": results.units["stress"],
         "time_unit": results.units["time"],
         "stress": limits.stress,

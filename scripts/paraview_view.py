@@ -20,13 +20,11 @@ RUN = {}
 FOLDER = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() else RUN["folder"]
 
 
-def coloured(shown, view, field, name, preset, least, largest, is_inverted=False):
+def coloured(shown, view, field, name, preset, least, largest):
     """Colours a representation by a field between two values, with a colour bar."""
     simple.ColorBy(shown, field)
     colours = simple.GetColorTransferFunction(field[1])
     colours.ApplyPreset(preset, True)
-    if is_inverted:
-        colours.InvertTransferFunction()
     colours.RescaleTransferFunction(least, largest)
     colours.AutomaticRescaleRangeMode = "Never"
     bar = simple.GetScalarBar(colours, view)
@@ -45,8 +43,7 @@ def view_of_deformation(fields, view):
     shown = simple.Show(body, view)
     shown.Representation = "Surface With Edges"
     shown.EdgeColor = [0.4, 0.4, 0.4]
-    coloured(shown, view, ("POINTS", "damage"), "1 - zeta", "Magma (matplotlib)", 0.0,
-             RUN["damage"] or 1.0, is_inverted=True)
+    coloured(shown, view, ("POINTS", "damage"), "1 - zeta", "Magma (matplotlib)", 0.0, RUN["damage"] or 1.0)
     outline = simple.Show(fields, view)
     setup(outline, Representation="Feature Edges", LineWidth=1.5, ColorArrayName=["POINTS", ""],
           AmbientColor=[0, 0, 0], DiffuseColor=[0, 0, 0])

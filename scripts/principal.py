@@ -1,11 +1,14 @@
 """Principal stresses: tension and compression apart, with lines along their directions."""
 
+from functools import lru_cache
+
 import numpy as np
 from matplotlib.path import Path
 
 import signorini_results
-from bars import three_digits
-from drawing import INK, canvas, draw_foundation, draw_outline, draw_stress, frame, headline, mesh_of, panels_of
+from drawing import (
+    INK, OPTIONS, Map, draw_foundation, draw_maps, draw_outline, draw_stress, headline, mesh_of, stress_colours,
+)
 from limits import stress_top
 from results import ROUNDING
 
@@ -14,35 +17,42 @@ LINES, DENSITY = 24, 5.0
 
 
 def draw_principal(results, _limits, figure=None):
-    """Tension, the positive part of σ₁, beside compression, the negative part of σ₂. The lines have the directions
-    of these stresses, and lengths in proportion to them. None for an unloaded body."""
+    """Tension, the positive part of σ₁, beside compression, the negative part of σ₂. None for an unloaded body."""
+    maps = principal_maps(results)
+    return maps and draw_maps(maps, headline(results, f"principal stresses at {results.part}"), results.units, figure)
+
+
+def principal_maps(results):
+    """Tension and compression. The lines have the directions of these stresses, and lengths in proportion to them. None
+    for an unloaded body."""
     if not results.principal.any():
         return None
-    extent = np.ptp(results.nodes, axis=0)
-    size, shape = panels_of(extent)
-    figure = canvas(size, figure)
     # Rounding errors are no stress.
     noise = ROUNDING * results.von_mises.max()
-    longest = extent.max() / min(LINES, DENSITY * (size[0] / shape[1] - 1.5))
-    places, values, directions = _principal_at(results, longest)
-    panels = [(name, key, np.where(stress > noise, stress, 0.0), np.maximum(of, 0.0), along) for
-              name, key, stress, of, along in (
-                  ("tension", "principal_max", results.principal[:, 0], values[:, 1], directions[:, :, 1]),
-                  ("compression", "principal_min", -results.principal[:, 1], -values[:, 0], directions[:, :, 0]))]
-    mesh = mesh_of(results, results.nodes)
-    least_top = 0.05 * max(stress_top(results, stress) for _, _, stress, _, _ in panels)
-    for axes, (name, key, stress, of, along) in zip(figure.subplots(*shape), panels):
+    parts = [("tension", "principal_max", results.principal[:, 0], 1),
+             ("compression", "principal_min", -results.principal[:, 1], 0)]
+    parts = [(name, key, np.where(stress > noise, stress, 0.0), k) for name, key, stress, k in parts]
+    least_top = 0.05 * max(stress_top(results, stress) for _, _, stress, _ in parts)
+    box = np.array([results.nodes.min(axis=0), results.nodes.max(axis=0)])
+
+    def map_of(name, key, stress, k):
         top = max(stress_top(results, stress), least_top)
-        factor, unit, top = draw_stress(axes, mesh, results, stress, name, top)
-        largest = three_digits(stress.max() / factor)
-        singular = ": singular" if results.singular(key) else ""
-        axes.set_title(f"{name}, largest {largest} {unit}{singular}" if stress.any() else f"no {name}")
-        _draw_lines(axes, results, places, longest, np.minimum(of / top, 1.0)[:, None] * along)
-        draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
-        draw_foundation(axes, results)
-        frame(axes, results.nodes, results.units)
-    figure.suptitle(headline(results, f"principal stresses at {results.part}"))
-    return figure
+        *_, factor, unit = stress_colours(results, top)
+        title = f"{name} ({unit})"
+        if OPTIONS.titles:
+            # The smallest σ₂ is negative where there is compression.
+            said = results.said(key, (2 * k - 1) * stress.max(), (2 * k - 1) * factor)
+            title += f", largest {said}" + ": singular" * bool(results.singular(key)) if stress.any() else ": none"
+
+        def paint(axes):
+            draw_stress(axes, mesh_of(results, results.nodes), results, stress, top)
+            _draw_lines(axes, results, k, top)
+            draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
+            draw_foundation(axes, results)
+
+        return Map(title, box, paint)
+
+    return [map_of(*part) for part in parts]
 
 
 def _principal_at(results, spacing):
@@ -52,18 +62,29 @@ def _principal_at(results, spacing):
     counts = np.maximum(1, np.round(extent / spacing).astype(int))
     steps = (low[k] + (np.arange(count) + 0.5) * extent[k] / count for k, count in enumerate(counts))
     points = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
-    state = signorini_results.load(results.folder).frame(results.time)
+    state = _frame_of(results.folder, results.time)
     triangles, barycentric = state.locate(points)
     points = points[results.shown[triangles] & np.isfinite(barycentric[:, 0])]
     return points, *np.linalg.eigh(state.at(points, "stress")[:, [[0, 2], [2, 1]]])
 
 
-def _draw_lines(axes, results, points, longest, lines):
-    """Lines centred at points, within the body, as fractions of the longest. White under dark ones keeps them visible."""
-    body = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
-    are_seen = np.linalg.norm(lines, axis=1) > 0.1
-    points, half = points[are_seen], 0.45 * longest * lines[are_seen]
+@lru_cache(maxsize=1)
+def _frame_of(folder, time):
+    return signorini_results.load(folder).frame(time)
+
+
+def _draw_lines(axes, results, k, top):
+    """Lines along the direction of the smaller (k = 0) or larger (k = 1) principal stress, within the body, as long as
+    the stress is high. White under dark ones keeps them visible."""
+    extent = np.ptp(results.nodes, axis=0)
+    inches = axes.get_position().size * axes.figure.get_size_inches()
+    longest = extent.max() / min(LINES, DENSITY * inches.max())
+    points, values, directions = _principal_at(results, longest)
+    part = np.clip((2 * k - 1) * values[:, k] / top, 0.0, 1.0) if top else np.zeros(len(values))
+    are_seen = part > 0.1
+    points, half = points[are_seen], 0.45 * longest * (part[:, None] * directions[:, :, k])[are_seen]
     ends = np.stack((points - half, points + half, np.full_like(points, np.nan)), axis=1)
+    body = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
     for colour, width in (("white", 1.8), (INK, 0.8)):
         axes.plot(*ends.reshape(-1, 2).T, color=colour, linewidth=width, zorder=3, solid_capstyle="round",
                   clip_path=(body, axes.transData))

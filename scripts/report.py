@@ -20,32 +20,27 @@ from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
-from drawing import RED, headline, least_zeta, np, plt, wrap_titles
-from bars import barred, three_digits
+from drawing import FAINT, RED, plt, wrapped
+from bars import barred
 from contact_pressure import draw_evolution, draw_pressure
 from figures import FIGURES
 from histories import draw_histories
 from limits import limits_of
-from maps import draw_state
+from maps import draw_everything, draw_state
 from reading import evenly, read_results, states
-from report_pdf import FULL, HIGHEST, SPACE, pages_of
+from report_pdf import FULL, LINE, SIZE, SPACE, pages_of
 from results import telling
-from signorini_summaries import bars, flag_of, folders_of, unit_of
+from signorini_summaries import flag_of, folders_of
 from table import text_of
 
-# The largest number of frames of the slider.
-FRAMES = 10
+# The largest numbers of frames of the slider, and of the contact pressure in time.
+FRAMES, EVOLUTION = 10, 50
+# The least height, inches, for the maps of the PDF on a page with other blocks.
+LEAST_MAPS = 3.0
 # The limits of the model, for the head of the report.
 MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
-# Places, which the PDF leaves out: it has two pages.
-PLACES = [f".{name}_{axis}" for name in ("contact_start", "contact_end", "peak") for axis in "xy"]
 # What the processes draw, by name.
 TASKS = {}
-# Values of summary.json for the last state, with their names.
-FACTS = {
-    "solver": "contact solver", "ranks": "ranks", "nodes": "nodes", "triangles": "triangles", "steps": "time steps",
-    "end_time": "last time", "stopped_by": "stopped by", "stopped_at": "stopped at", "active_nodes": "active nodes", "contact_nodes": "contact nodes",
-}
 ERRORS = {
     "displacement_mesh": "u, from the mesh (energy norm)",
     "damage_mesh": "damage, from the mesh (L²)",
@@ -59,7 +54,6 @@ def encoded(figure, dpi=110):
     """The figure as a PNG in base64; "" without a figure."""
     if figure is None:
         return ""
-    wrap_titles(figure)
     with io.BytesIO() as file:
         figure.savefig(file, format="png", dpi=dpi)
         plt.close(figure)
@@ -108,9 +102,8 @@ def table(rows, head=()):
 
 def frame(state, limits):
     """The pictures at one time; they have the same size at all times."""
-    with plt.rc_context({"savefig.bbox": None}):
-        drawn = {"state": draw_state(state, limits), "pressure": draw_pressure(state, limits)}
-        return {"moment": state.moment, **{name: encoded(figure, dpi=90) for name, figure in drawn.items()}}
+    drawn = {"state": draw_state(state, limits), "pressure": draw_pressure(state, limits)}
+    return {"moment": state.moment, **{name: encoded(figure, dpi=90) for name, figure in drawn.items()}}
 
 
 def slider(frames):
@@ -127,68 +120,93 @@ def template():
     return [Template(text) for text in spec.loader.get_data(path).decode().split("<!-- slider -->\n")]
 
 
-def facts(results, left_out=()):
-    """The values of summary.json for the last state, and the given quantities by name. Names that end with one of
-    `left_out` are left out."""
-    summary, errors = results.summary, bars(results.summary)
-    figures = summary.get("figures") or {}
-
-    def text(name, value):
-        flag, _ = flag_of(figures.get(name))
-        if flag:
-            return f"{value:.2g}, {flag}"
-        is_rounded = summary.get("stopped_at") is not None and isinstance(value, float)
-        return barred(value, errors.get(name)) or (three_digits(value) if is_rounded else value)
-
-    rows = [(name, text(key, summary[key]), unit_of(key, summary))
-            for key, name in FACTS.items() if summary.get(key) is not None]
-    return rows + [(of["label"], text(name, of["value"]), of["unit"]) for name, of in figures.items()
-                   if of["value"] is not None and not name.endswith(tuple(left_out))]
+def said(figure, value):
+    """A value of a figure as text: with its bar if it is that of the last state, and with two digits and the reason if
+    the mesh does not determine it."""
+    flag, _ = flag_of(figure)
+    if flag:
+        return f"{value:.2g}, {flag}"
+    bar = figure["bar"] if value == figure["value"] else None
+    return barred(value, bar) or f"{float(f'{value:.4g}'):g}"
 
 
-def governing(everything, units):
-    """The extreme values of the run, with their places and times."""
-    kinds = (
-        ("largest tension σ₁", "principal_max", "stress", lambda state: state.principal[:, 0], 1.0),
-        ("largest compression −σ₂", "principal_min", "stress", lambda state: -state.principal[:, 1], 1.0),
-        ("largest von Mises stress", "von_mises_max", "stress", lambda state: state.von_mises, 1.0),
-        ("largest contact pressure", "pressure_max", "stress", lambda state: state.pressure, 1.0),
-        ("largest displacement", "displacement_max", "length",
-         lambda state: np.linalg.norm(state.displacement, axis=1), 1.0),
-        ("least ζ", "zeta_min", "", lambda state: state.zeta, -1.0),
-    )
-    rows = []
-    for name, key, kind, of, sign in kinds:
-        found = [(sign * (sign * of(state)).max(), state, (sign * of(state)).argmax()) for state in everything]
-        value, state, node = max(found, key=lambda one: sign * one[0])
-        if value == (1.0 if name == "least ζ" else 0.0):
+def governing(results):
+    """The extreme values of the run: of each figure of the whole body its name, value, unit, time, place, the value of
+    the last state if it is another one, and why the mesh does not determine it."""
+    rows, unit = [], results.units["time"]
+    for name, figure in results.summary.get("figures", {}).items():
+        value, time = figure["governing"]["value"], figure["governing"]["time"]
+        if "." in name or value is None:
             continue
-        x, y = state.nodes[node]
-        extreme = (state.summary["figures"].get(key) if state.is_last else None) or {}
-        is_there = extreme and np.allclose(extreme["at"], (x, y), atol=1e-9 * state.size)
-        flag, reason = flag_of(extreme if is_there else None)
-        plain = least_zeta(value) if key == "zeta_min" else f"{value:.{2 if flag else 4}g}"
-        text = state.barred(key, value) or plain
-        rows.append((name, text, units.get(kind, ""), f"({x:.4g}, {y:.4g})", f"{state.time:g} {units['time']}",
-                     f"{flag}: {reason}" if flag else ""))
-    return rows
+        is_last = value == figure["value"]
+        place = figure["at"] if is_last else None
+        text, last = said(figure, value), "" if is_last else said(figure, figure["value"])
+        if name == "zeta_min" and results.summary.get("stopped_by") == "damage":
+            text, last, time = "reached ζ_*", said(figure, figure["value"]), None
+        rows.append((figure["label"], text, figure["unit"], results.stopping_time if time is None else f"{time:g}",
+                     f"({place[0]:.4g}, {place[1]:.4g})" if place else "", last, flag_of(figure)[1]))
+    before = ", before the stop" if results.summary.get("stopped_by") else ""
+    return _filled(("", "over all steps", "", f"at t ({unit})", f"at ({results.units['length']})", f"last state{before}",
+                    "why not determined"), rows)
+
+
+def by_name(results):
+    """Tables of the figures of supports, probes and materials: a row for each name, and two where the largest value of
+    the run is not that of the last state; a column for each figure, or for each pair of components."""
+    figures = results.summary.get("figures", {})
+    names = {}
+    for key in figures:
+        name, point, figure = key.rpartition(".")
+        if point:
+            names.setdefault(name, []).append(figure)
+    tables = {}
+    for name, keys in names.items():
+        tables.setdefault(tuple(keys), []).append(name)
+    for keys, group in tables.items():
+        pairs = {key: (key, f"{key[:-1]}y") for key in keys if key.endswith("_x") and f"{key[:-1]}y" in keys}
+        columns = [pairs.get(key, (key,)) for key in keys if not (key.endswith("_y") and f"{key[:-1]}x" in pairs)]
+        rows = []
+        for name in group:
+            cells = [[figures[f"{name}.{key}"] for key in column] for column in columns]
+            rows.append([name, *(_cell([(of, of["value"]) for of in cell]) for cell in cells)])
+            largest = [_cell([(of, of["governing"]["value"]) for of in cell]) for cell in cells]
+            times = [", ".join(dict.fromkeys(f"{of['governing']['time']:g}" for of in cell)) for cell in cells]
+            shown = [f"{text} at t = {time}" * (text != last) for text, time, last in zip(largest, times, rows[-1][1:])]
+            rows += [["   largest", *shown]] * any(shown)
+        of_first = [figures[f"{group[0]}.{column[0]}"] for column in columns]
+        heads = [f"{of['label'].replace(f' of {group[0]}', '').removesuffix(', x')} ({of['unit']})".replace(" ()", "")
+                 for of in of_first]
+        yield ["", *heads], rows
+
+
+def _cell(parts):
+    """A value, or a pair of components."""
+    texts = [said(*part) for part in parts]
+    return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
+
+
+def _filled(head, rows):
+    """The head and the rows without columns that are empty."""
+    chosen = [k for k in range(len(head)) if any(row[k] for row in rows)]
+    return [head[k] for k in chosen], [[row[k] for k in chosen] for row in rows]
 
 
 def body(results):
-    """Dimensions, materials, and the resultants of the supports."""
+    """Dimensions and materials."""
     units, scene = results.units, results.scene
     low, high = results.nodes.min(axis=0), results.nodes.max(axis=0)
     material = scene.get("material", {})
     rows = [("dimensions", f"{high[0] - low[0]:.4g} × {high[1] - low[1]:.4g} {units['length']}"),
             ("plane", str(material.get("plane", "")))]
     surfaces = [name for name, of in material.items() if isinstance(of, dict)]
-    rows += [(name, results.elasticity(name)) for name in ("material", *surfaces)]
-    figures = results.summary.get("figures", {})
-    for name in dict.fromkeys(key.rpartition(".")[0] for key in figures if key.endswith(".moment")):
-        x, y, moment = (figures[f"{name}.{part}"]["value"] for part in ("force_x", "force_y", "moment"))
-        rows.append((f"on the body at {name}", f"force ({x:.5g}, {y:.5g}) {units['line']}, "
-                     f"moment about (0, 0) {moment:.5g} {units['force']}"))
-    return rows
+    return rows + [(name, results.elasticity(name)) for name in ("material", *surfaces)]
+
+
+def run_of(summary):
+    """The size and the solver of the run."""
+    names = {"solver": "contact solver", "ranks": "ranks", "nodes": "nodes", "triangles": "triangles",
+             "contact_nodes": "contact nodes", "active_nodes": "active nodes", "steps": "time steps", "end_time": "last time"}
+    return [(name, summary[key]) for key, name in names.items() if summary.get(key) is not None]
 
 
 def timings(summary):
@@ -212,13 +230,14 @@ def head_of(results, arguments):
     error = results.summary.get("error")
     return (arguments.title or results.title, " · ".join(filter(None, (arguments.author, arguments.date))),
             results.overrides and f"with {results.overrides}",
-            error and f"failed: {error}" or results.ending.replace("$_*$", "_*"))
+            error and f"failed: {error}" or results.ending)
 
 
 def errors_of(summary):
     """The estimated relative errors."""
     errors = {key: value for key, value in (summary.get("errors") or {}).items() if isinstance(value, float)}
-    return [(ERRORS.get(key, key), f"{100 * value:.2g} %") for key, value in errors.items()]
+    return [(ERRORS.get(key, key), "unknown: as large as the solution, or larger" if value > 1.0 else
+             f"{100 * value:.2g} %") for key, value in errors.items()]
 
 
 def page(results, arguments, everything):
@@ -226,9 +245,12 @@ def page(results, arguments, everything):
     summary, scene = results.summary, results.folder / "scene.toml"
     chosen = [state for _, state in evenly([(state.time, state) for state in everything], FRAMES)]
     limits = limits_of(chosen)
-    tasks = {state.time: partial(frame, state, limits) for state in chosen}
+    frames = {state.time: partial(frame, state, limits) for state in chosen}
     named = pictures(results, everything)
-    drawn = all_drawn({name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | tasks)
+    # The longest task first.
+    tasks = {"pdf": partial(write_pdf, results.folder / "report.pdf", results, arguments, everything)}
+    tasks = tasks if arguments.pdf else {}
+    drawn = all_drawn(tasks | {name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | frames)
     elements = {name: element(name, drawn[name]) for name in named}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
     title, byline, subtitle, ending = map(html.escape, head_of(results, arguments))
@@ -236,13 +258,13 @@ def page(results, arguments, everything):
         title=title,
         byline=byline,
         model=MODEL,
-        governing=table(governing(everything, results.units), head=("", "value", "", "at", "time", "")),
+        governing=table(*governing(results)[::-1]),
+        by_name="".join(table(rows, head) for head, rows in by_name(results)),
         body=table(body(results)),
         subtitle=subtitle,
         ending=ending,
-        facts=table(facts(results)),
         setting=elements["setting"],
-        slider=slider([drawn[time] for time in tasks]),
+        slider=slider([drawn[time] for time in frames]),
         pictures="".join(elements[name] for name in (
             "deformed", "stress-damage", "principal-stresses", "pressure")),
         histories="".join(elements[name] for name in (
@@ -253,33 +275,48 @@ def page(results, arguments, everything):
         notes=f"<p>Notes:</p><ul>{''.join(notes)}</ul>" if notes else "",
         scene=html.escape(scene.read_text(encoding="utf-8") if scene.exists() else "not kept"),
         timings=table(timings(summary)),
+        run=table(run_of(summary)),
         provenance=table(provenance(summary)),
     )
 
 
 def write_pdf(path, results, arguments, everything):
-    """Writes two pages: the setting and the governing values; maps and curves."""
+    """Writes two pages: the setting, the governing values and curves; maps. What only its author needs is at the end."""
     title, byline, subtitle, ending = head_of(results, arguments)
     draw, summary = pictures(results, everything), results.summary
-    with pages_of(path, headline(results, "")) as pages:
+    with pages_of(path) as pages:
         pages.text(title, size=14, weight="bold")
         pages.text("\n".join(filter(None, (byline, subtitle, MODEL))))
         pages.text(ending, color=RED, weight="bold")
-        pages.table("Last state", facts(results, PLACES))
-        drawing.set_width(pages.room)
+        errors = errors_of(summary)
+        pages.table("Body, materials, and estimated relative errors", body(results) + [("", "")] * bool(errors) + errors)
+        drawing.use(size=SIZE, width=pages.beside if pages.beside > 2.5 else FULL, height=2.8)
         draw["setting"](figure=pages)
-        pages.table("Governing values", governing(everything, results.units))
-        pages.table("Body, materials, supports", body(results))
-        pages.table("Estimated relative errors", errors_of(summary))
-        pages.table("Made by", provenance(summary)[:-1])
+        pages.new_line()
+        head, rows = governing(results)
+        pages.table("Governing values", rows, head)
+        title = "Supports, probes, materials"
+        for head, rows in by_name(results):
+            pages.new_line()
+            pages.table(title, rows, head)
+            title = ""
         pages.text("\n".join(f"Note: {note}" for note in summary.get("notes", [])))
-        pages.end()
-        # A static solve has no histories: three rows of pictures instead of four.
-        pages.start(HIGHEST if len(everything) > 1 else 4 / 3 * HIGHEST)
-        for name in ("deformed", "pressure", "stress-damage", "principal-stresses", "force-displacement",
-                     "damage-history"):
-            drawing.set_width(FULL if "stress" in name else 0.5 * (FULL - SPACE))
-            draw[name](figure=pages)
+        pages.new_line()
+        # Three plots stand beside each other.
+        third = (FULL - 2 * SPACE) / 3
+        drawing.use(width=third)
+        draw["force-displacement"](figure=pages)
+        draw["damage-history"](figure=pages)
+        drawing.use(width=third if len(results.curves) < 2 else FULL)
+        draw["pressure"](figure=pages)
+        if pages.number == 1 or pages.left < LEAST_MAPS:
+            pages.next()
+        pages.new_line()
+        made = " · ".join(f"{name} {value}" for name, value in run_of(summary) + provenance(summary)[:-1])
+        last = LINE * (len(wrapped(made, FULL, SIZE)) + 1)
+        drawing.use(width=FULL, height=pages.left - last - 0.4)
+        draw_everything(results, limits_of([results]), pages)
+        pages.text(made, color=FAINT)
 
 
 def main(prog=None):
@@ -292,15 +329,15 @@ def main(prog=None):
     parser.add_argument("--author", default="")
     parser.add_argument("--date", default="")
     arguments, failed = parser.parse_args(), False
+    drawing.use(head=False)
     for folder in folders_of(arguments.folders):
         with telling() as problems:
             results = read_results(folder)
-            everything = states(results, evenly(results.frames, 400))
+            everything = states(results, evenly(results.frames, EVOLUTION))
             path = results.folder / "report.html"
             path.write_text(page(results, arguments, everything), encoding="utf-8")
             print(path)
             if arguments.pdf:
-                write_pdf(path.with_suffix(".pdf"), results, arguments, everything)
                 print(path.with_suffix(".pdf"))
         failed |= bool(problems)
     return 2 if failed else 0

@@ -1,108 +1,116 @@
 """The pages of report.pdf: text as text, pictures as vector graphics."""
 
-import textwrap
 from contextlib import contextmanager
-from itertools import zip_longest
 
 from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.textpath import TextPath
 
 import drawing
-from drawing import INK, plt
+from drawing import INK, OPTIONS, plt, width_of, wrapped
 from table import text_of
 
 # A4, its margins, and the space between blocks, inches.
 WIDTH, HEIGHT, MARGIN, SPACE = 8.27, 11.69, 0.6, 0.15
 FULL = WIDTH - 2 * MARGIN
-# The size of letters, points, the height of a line, inches, and the number of letters that fit into the full width.
-SIZE, LINE, LETTERS = 8, 0.155, 125
-# The largest height of four pictures below each other, inches.
-HIGHEST = 2.45
+# The size of letters, points, and the height of a line, inches.
+SIZE, LINE = 8, 0.155
 
 
 class Pages:
     """Pages of blocks that stand beside each other where there is room, and otherwise below each other."""
 
-    def __init__(self, pdf, head):
-        self.pdf, self.head, self.figure = pdf, head, None
+    def __init__(self, pdf):
+        self.pdf, self.number = pdf, 0
         self.start()
 
-    def start(self, highest=0.33 * HEIGHT):
-        """Starts a page with pictures up to this height."""
-        self.highest, self.x, self.y, self.bottom = highest, MARGIN, MARGIN, MARGIN
+    def start(self):
+        """Starts a page."""
+        self.x, self.y, self.bottom, self.number = MARGIN, MARGIN, MARGIN, self.number + 1
         self.figure = plt.figure(figsize=(WIDTH, HEIGHT))
 
     def end(self):
-        """Saves the page. The titles of pictures lack `head`, the title of the report."""
-        for part in self.figure.subfigs:
-            for title in (*(axes.title for axes in part.axes), *filter(None, [part._suptitle])):
-                title.set_text(title.get_text().removeprefix(self.head).strip("\n"))
-        if self.figure.subfigs:
-            drawing.wrap_titles(self.figure)
-        self.pdf.savefig(self.figure, dpi=220)
+        """Saves the page."""
+        self.pdf.savefig(self.figure, dpi=150)
         plt.close(self.figure)
 
+    def next(self):
+        """Saves the page, and starts another one."""
+        self.end()
+        self.start()
+
     def place(self, width, height):
-        """The upper left corner of a new block of this size."""
+        """The page and the upper left corner of a new block of this size."""
         if self.x > MARGIN and self.x + width > WIDTH - MARGIN + 0.01:
-            self.x, self.y = MARGIN, self.bottom
+            self.new_line()
         if self.y > MARGIN and self.y + height > HEIGHT - MARGIN + 0.01:
-            self.end()
-            self.start(self.highest)
+            self.next()
         x, y = self.x, self.y
         self.x, self.bottom = x + width + SPACE, max(self.bottom, y + height + SPACE)
-        return x, y
+        return self.figure, x, y
+
+    def new_line(self):
+        """The next block stands below all others."""
+        self.x, self.y = MARGIN, self.bottom
 
     @property
-    def room(self):
-        """The width beside the last block; half of the page if that is too small for a picture."""
-        room = WIDTH - MARGIN - self.x
-        return room if room > 2.5 else 0.5 * (FULL - SPACE)
+    def beside(self):
+        """The width beside the last block."""
+        return WIDTH - MARGIN - self.x
 
-    def panel(self, width, height):
-        """A block for a picture."""
-        height = min(height, self.highest)
-        x, y = self.place(width, height)
-        grid = self.figure.add_gridspec(
-            3, 3, width_ratios=(x, width, WIDTH - x - width), height_ratios=(y, height, HEIGHT - y - height))
-        return self.figure.add_subfigure(grid[1, 1])
+    @property
+    def left(self):
+        """The height below all blocks of the page."""
+        return HEIGHT - MARGIN - self.bottom
 
     def write(self, x, y, text, size=SIZE, **style):
         self.figure.text(x / WIDTH, 1.0 - y / HEIGHT, text, size=size, va="top", parse_math=False, **style)
 
     def text(self, text, size=SIZE, **style):
-        """A block of text."""
-        lines = [part for line in text.splitlines() for part in textwrap.wrap(line, int(LETTERS * SIZE / size))]
-        height = LINE * size / SIZE
-        x, y = self.place(FULL, height * len(lines) - 0.6 * SPACE)
-        for k, line in enumerate(lines):
-            self.write(x, y + k * height, line, size, **style)
+        """A block of text over the full width."""
+        lines, line = wrapped(text, FULL / (1.15 if "weight" in style else 1.0), size), LINE * size / SIZE
+        self.new_line()
+        _, x, y = self.place(FULL, line * len(lines) - 0.6 * SPACE)
+        for k, text in enumerate(lines):
+            self.write(x, y + k * line, text, size, **style)
 
-    def table(self, title, rows):
-        """A block with a title and rows of cells. Columns are as wide as their widest cells."""
-        columns = [list(map(text_of, column)) for column in zip_longest(*rows)]
-        widths = [max(map(width_of, column)) + 0.15 for column in columns]
-        x, y = self.place(max(sum(widths), width_of(title) * 1.4), (len(rows) + 1.4) * LINE)
+    def table(self, title, rows, head=()):
+        """A block with a title and rows of cells, below a head if there is one. Columns are as wide as their widest
+        cells; those that do not fit stand below the others, with the first column again."""
+        cells = [[text_of(cell) for cell in row] for row in rows]
+        columns = [list(column) for column in zip(*cells)]
+        widths = [max(width_of(cell, SIZE) for cell in column) + 0.15 for column in columns]
+        if head:
+            widths = [max(width, min(width_of(name, SIZE) + 0.15, 1.0)) for width, name in zip(widths, head)]
+        while columns:
+            count = len(columns)
+            while count > 2 and sum(widths[:count]) > FULL:
+                count -= 1
+            self._part(title, columns[:count], widths[:count], head[:count])
+            title = ""
+            columns, widths, head = ([of[0], *of[count:]] if count < len(of) else [] for of in (columns, widths, head))
+
+    def _part(self, title, columns, widths, head):
+        heads = [wrapped(name, width - 0.1, SIZE) for name, width in zip(head, widths)]
+        first = 1.4 * bool(title)
+        above = first + max(map(len, heads), default=0)
+        height = (len(columns[0]) + above) * LINE
+        _, x, y = self.place(max(sum(widths), width_of(title, SIZE) * 1.4), height)
         self.write(x, y, title, size=1.2 * SIZE, weight="bold", color=INK)
-        for column, width in zip(columns, widths):
-            for k, cell in enumerate(column):
-                self.write(x, y + (k + 1.4) * LINE, cell)
+        for k, (column, width) in enumerate(zip(columns, widths)):
+            for line, text in enumerate(heads[k] if heads else ()):
+                self.write(x, y + (first + line) * LINE, text, color="#66707a")
+            for line, cell in enumerate(column):
+                self.write(x, y + (above + line) * LINE, cell)
             x += width
 
 
-def width_of(text):
-    """The width of a text, inches."""
-    return TextPath((0, 0), text.replace("$", r"\$"), size=SIZE).get_extents().width / 72 if text.strip() else 0.0
-
-
 @contextmanager
-def pages_of(path, head):
-    """Pages for a PDF. The titles of pictures are written without `head`; their widths are set for the pages."""
-    style = {"savefig.bbox": None, "figure.constrained_layout.w_pad": 0.02, "figure.constrained_layout.h_pad": 0.02}
+def pages_of(path):
+    """Pages for a PDF, and pictures for them."""
+    before = dict(vars(OPTIONS))
     try:
-        with PdfPages(path) as pdf, plt.rc_context(style):
-            pages = Pages(pdf, head)
+        with PdfPages(path) as pdf:
+            pages = Pages(pdf)
             yield pages
             pages.end()
     finally:
-        drawing.WIDTH = None
+        drawing.use(**before)

@@ -134,7 +134,7 @@ class Results:
         if self.summary.get("stopped_by") == "collapse":
             motion = self.summary["collapse"]["motion"]
             return f"stopped at {at}: nothing supports the body against {motion}"
-        return f"stopped: ζ$_*$ reached at {at}"
+        return f"stopped: ζ_* reached at {at}"
 
     def falling(self, points):
         """The velocities at points of the motion that nothing supports any more, the largest 1; None if the run has not
@@ -188,6 +188,11 @@ class Results:
         """A figure of the last state with its error bar; None at other times, or without one."""
         return barred(value, bars(self.summary).get(name)) if self.is_last else None
 
+    def said(self, name, value, factor=1.0, plain=three_digits):
+        """A figure of this state over `factor` as text, with its error bar if it has one."""
+        bar = bars(self.summary).get(name) if self.is_last else None
+        return barred(value / factor, bar and bar / abs(factor)) or plain(value / factor)
+
     def singular(self, name="von_mises_max"):
         """What makes an extreme stress of the last state singular; None if nothing does, and at other times."""
         largest = self.summary.get("figures", {}).get(name) or {}
@@ -221,6 +226,12 @@ class Results:
             joined += zip(ends, ends[1:])
         return [np.array([at[end] for end in path]) for path in paths(joined)]
 
+    def displacement_at(self, points):
+        """The displacements of nodes at points."""
+        nodes, wanted = self.nodes @ (1.0, 1.0j), points @ (1.0, 1.0j)
+        order = np.argsort(nodes)
+        return self.displacement[order[np.searchsorted(nodes[order], wanted)]]
+
     def foundation(self, factor=None):
         """The obstacle as polylines, for displacements amplified by `factor`.
 
@@ -229,9 +240,7 @@ class Results:
         """
         lines = self.obstacle
         if factor is not None:
-            at = {tuple(x): u for x, u in zip(self.nodes.tolist(), self.displacement)}
-            u = np.array([at[tuple(x)] for x in self.contact.reshape(-1, 2).tolist()])
-            u = u.reshape(self.contact.shape)
+            u = self.displacement_at(self.contact)
             sliding = (u * self.tangents).sum(axis=2, keepdims=True) * self.tangents
             lines = self.contact + factor * (self.obstacle - self.contact + sliding)
         lines = np.round(lines, 12)

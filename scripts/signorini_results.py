@@ -122,6 +122,20 @@ class Run:
         """The times of the frames, s."""
         return [time for time, _ in self.frames]
 
+    def parts(self, boundary):
+        """The connected parts of a boundary of the scene as polylines, (n, 2) each: with increasing x, or y if they are
+        higher than wide; a closed part begins at any point."""
+        try:
+            edges = self.summary["boundaries"][boundary]
+        except KeyError:
+            known = ", ".join(self.summary["boundaries"])
+            raise ValueError(f"there is no boundary {boundary}; there are {known}") from None
+        parts = [np.array(path) for path in paths([tuple(map(tuple, edge)) for edge in edges])]
+        way = np.ptp(np.vstack(parts), axis=0).argmax()
+        turned = [part[::-1] if tuple(part[-1, [way, 1 - way]]) < tuple(part[0, [way, 1 - way]]) else part
+                  for part in parts]
+        return sorted(turned, key=lambda part: tuple(part[0, [way, 1 - way]]))
+
     def frame(self, time=None):
         """The frame nearest to a time, or the last one."""
         at = min(self.frames, key=lambda of: abs(of[0] - time)) if time is not None else self.frames[-1]
@@ -157,12 +171,10 @@ class Frame:
         return s[:, 0] * np.linalg.norm(np.subtract(end, start)), self.at(points, name)
 
     def along(self, boundary, name):
-        """A field along a boundary of the scene: the distances from its first end along it, and the values at the
-        vertices. Parts that are not connected have a NaN between them."""
-        edges = np.array(self.run.summary["boundaries"][boundary])
+        """A field along a boundary of the scene, in the direction of `Run.parts`: the distances from its first end, and
+        the values at the vertices. Parts that are not connected have a NaN between them."""
         places, values, length = [], [], 0.0
-        for path in paths([tuple(map(tuple, edge)) for edge in edges.tolist()]):
-            points = np.array(path)
+        for points in self.run.parts(boundary):
             steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
             places += [*(length + np.concatenate(([0.0], np.cumsum(steps)))), np.nan]
             values += [*self.at(points, name), np.nan]

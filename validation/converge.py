@@ -253,7 +253,7 @@ def finish(axes):
 
 def draw(rows, path):
     """Both figures side by side."""
-    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8))
+    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
     for axes, draw_errors in zip(panels, (draw_sums, draw_orders)):
         draw_errors(axes, rows)
         finish(axes)

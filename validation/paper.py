@@ -14,7 +14,6 @@ import numpy as np
 
 from shared import ROOT, parser_of
 import converge
-import drawing
 from drawing import BLUE, INK, RED, plt
 from limits import limits_of
 from maps import draw_deformed, draw_mesh, draw_stress_and_damage
@@ -60,7 +59,7 @@ def solved(binary, name, sets, folder):
 
 def draw_sketch():
     """Figure 1: the body Ω, the parts Γ_D, Γ_N, Γ_C of its boundary, and the gap g to the obstacle."""
-    figure, axes = plt.subplots(figsize=(5.0, 3.6))
+    figure, axes = plt.subplots(figsize=(5.0, 3.6), layout="constrained")
     angle = np.linspace(0.0, 2 * np.pi, 400)
     radius = 1.0 + 0.08 * np.cos(3 * angle) + 0.05 * np.sin(2 * angle)
     x, y = 1.5 * radius * np.cos(angle), radius * np.sin(angle)
@@ -94,7 +93,6 @@ def draw_sketch():
 
 def written(figure, out, name):
     """Saves a figure as PNG and PDF; returns the path of the PNG."""
-    drawing.wrap_titles(figure)
     for ending in ("pdf", "png"):
         path = out / f"{name}.{ending}"
         figure.savefig(path)
@@ -105,7 +103,6 @@ def written(figure, out, name):
 
 def figures(binary, out):
     """Draws the figures of the runs; returns the PNGs by number."""
-    drawing.DAMAGE = "zeta"
     found = {1: [written(draw_sketch(), out, "figure-1")]}
     for name, (sets, drawn) in RUNS.items():
         results = solved(binary, name, sets, out / "runs" / name)
@@ -126,7 +123,7 @@ def table_1(rows, out):
 
 
 def draw_figure_3(rows):
-    figure, axes = plt.subplots(figsize=(5.4, 4.2))
+    figure, axes = plt.subplots(figsize=(5.4, 4.2), layout="constrained")
     converge.draw_sums(axes, rows)
     converge.finish(axes)
     axes.legend(fontsize="small")
@@ -138,7 +135,8 @@ def sheet(found, out):
     pictures = [(number, path) for number in sorted(found) for path in found[number]]
     columns = 3 if len(pictures) % 3 == 0 else 5
     lines = -(-len(pictures) // columns)
-    page, grid = plt.subplots(lines, columns, figsize=(5.5 * columns, 4.4 * lines), squeeze=False)
+    page, grid = plt.subplots(lines, columns, figsize=(5.5 * columns, 4.4 * lines), squeeze=False,
+                              layout="constrained")
     for axes, (number, path) in zip(grid.flat, pictures):
         axes.axis("off")
         axes.imshow(plt.imread(path))

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import shared  # noqa: F401
-from drawing import plt
+from drawing import plt, wrapped
 from results import read_table
 
 COLOURS = {"correct": "#7fbf7b", "refused": "#fdd49e", "wrong": "#d7301f"}
@@ -43,8 +43,8 @@ def columns(*names):
     return lambda row: row[names[0]] if len(names) == 1 else tuple(row[n] for n in names)
 
 
-def points(axes, rows, x, y, by, scale="log", line=True, low=FLOOR):
-    """A line with marks per group, without rows that lack a value."""
+def points(axes, rows, x, y, by, labels, scale="log", line=True, low=FLOOR):
+    """A line with marks per group, without rows that lack a value. `labels` are those of both axes."""
     for k, (key, group) in enumerate(groups(rows, by).items()):
         at = sorted((x(row), max(y(row), low), row["verdict"]) for row in group if "" not in (x(row), y(row)))
         if not at:
@@ -55,18 +55,18 @@ def points(axes, rows, x, y, by, scale="log", line=True, low=FLOOR):
             bad = [(a, b) for a, b, found in at if found == verdict]
             if bad:
                 axes.plot(*zip(*bad), style, ms=8, mfc="none")
-    axes.set(xscale="log", yscale=scale)
+    axes.set(xscale="log", yscale=scale, xlabel=labels[0], ylabel=labels[1])
     axes.legend(frameon=False, fontsize=7)
 
 
-def cells(axes, rows, x, y, text):
-    """A field for each row, coloured by its verdict, with a text."""
+def cells(axes, rows, x, y, labels, text):
+    """A field for each row, coloured by its verdict, with a text. `labels` are those of both axes."""
     across, down = ([*groups(rows, key)] for key in (x, y))
     for row in rows:
         at = across.index(x(row)), down.index(y(row))
         axes.add_patch(plt.Rectangle(at, 1, 1, facecolor=COLOURS[row["verdict"]], edgecolor="white"))
         axes.text(at[0] + 0.5, at[1] + 0.5, text(row), ha="center", va="center", fontsize=7)
-    axes.set(xlim=(0, len(across)), ylim=(len(down), 0))
+    axes.set(xlim=(0, len(across)), ylim=(len(down), 0), xlabel=labels[0], ylabel=labels[1])
     turn = 90 if max(len(name(value)) for value in across) > LONG / 2 else 0
     axes.set_xticks(np.arange(len(across)) + 0.5, map(name, across), fontsize=7, rotation=turn)
     axes.set_yticks(np.arange(len(down)) + 0.5, map(name, down), fontsize=7)
@@ -91,72 +91,92 @@ def failure_error(row):
     return abs(row["failure_time"] / row["reference"] - 1)
 
 
+# What the sweeps of lost contact vary.
+LIFTS = {
+    "clamped, lifted": "1 − load/load of first touch", "free, lifted": "load/weight − 1",
+    "on a wedge, lighter": "resultant of the pressure (N/m)", "": "eccentricity of the pressure (m)",
+}
+
+
 def lost_contact(rows):
     """A panel for each sweep."""
-    return [(sweep, of, cells, dict(x=columns("value"), y=columns("solver"), text=iterations))
+    return [(sweep, of, cells, dict(x=columns("value"), y=columns("solver"), text=iterations,
+                                    labels=(LIFTS.get(sweep, LIFTS[""]), "solver")))
             for sweep, of in groups(solver_order(rows), columns("sweep")).items()]
 
 
 def step_size(rows):
     return [
-        ("time of failure over the uniform step (s)", [row for row in rows if row["step"] != ""], points,
-         dict(x=columns("step"), y=columns("failure_time"), by=columns("n"), scale="linear")),
-        ("its relative error over all steps, rejected ones included", [row for row in rows if row["steps"] > 0], points,
+        ("time of failure; lines: cells a side", [row for row in rows if row["step"] != ""], points,
+         dict(x=columns("step"), y=columns("failure_time"), by=columns("n"), scale="linear",
+              labels=("uniform step k (s)", "time of failure (s)"))),
+        ("its relative error; lines: cells a side, steps", [row for row in rows if row["steps"] > 0], points,
          dict(x=lambda row: row["steps"] + row["rejected"], y=failure_error,
-              by=lambda row: (row["n"], "uniform" if row["step"] != "" else "auto"))),
+              by=lambda row: (row["n"], "uniform" if row["step"] != "" else "auto"),
+              labels=("steps, rejected ones included", "relative error (1)"))),
     ]
 
 
 def maximum_principle(rows):
     panels = [(scene, of, side) for scene, of in groups(rows, columns("scene")).items()
               for side in ("rise", "undershoot")]
-    return [(f"{scene}: {side} of ζ beyond its bound over kκ/h²", of, points,
-             dict(x=columns("ratio"), y=columns(side), by=columns("h", "mass"), line=False, low=1e-10))
+    return [(f"{scene}; marks: h (m), mass", of, points,
+             dict(x=columns("ratio"), y=columns(side), by=columns("h", "mass"), line=False, low=1e-10,
+                  labels=("kκ/h² (1)", f"{side} of ζ beyond its bound (1)")))
             for scene, of, side in panels if any(row[side] > 0 for row in of)]
 
 
 def penalty(rows):
     rows = [row for row in rows if row["contrast"] == 1]
     coarse = groups([row for row in rows if row["h"] == 1 / 16], columns("accelerate"))
-    panels = [(f"iterations over ω/ω_auto and λω, {kind}, h = 1/16", of, cells,
-               dict(x=columns("omega_over_auto"), y=columns("lambda_omega"), text=iterations))
+    panels = [(f"iterations, {kind}, h = 1/16 m", of, cells,
+               dict(x=columns("omega_over_auto"), y=columns("lambda_omega"), text=iterations,
+                    labels=("ω/ω_auto (1)", "λω (1)")))
               for kind, of in zip(("plain", "Anderson"), coarse.values())]
     half = [row for row in rows if row["lambda_omega"] == 0.5]
-    return [*panels, ("iterations over ω/ω_auto, λω = ½", half, points, dict(
-        x=columns("omega_over_auto"), y=columns("iterations"), by=columns("h", "accelerate")))]
+    return [*panels, ("λω = ½; lines: h (m), accelerated", half, points, dict(
+        x=columns("omega_over_auto"), y=columns("iterations"), by=columns("h", "accelerate"),
+        labels=("ω/ω_auto (1)", "iterations")))]
 
 
 def tao_types(rows):
-    return [(f"tolerance {tolerance:g}", of, cells, dict(x=columns("scene"), y=columns("type"), text=iterations))
+    return [(f"iterations, tolerance {tolerance:g}", of, cells,
+             dict(x=columns("scene"), y=columns("type"), text=iterations, labels=("scene", "type of TAO")))
             for tolerance, of in groups(rows, columns("tolerance")).items()]
 
 
 def active_set(rows):
-    return [(f"{title} over the contrast of the stiffness", rows, points, dict(
-        x=columns("contrast"), y=columns(key), by=columns("kind"), line=False, scale=scale))
-            for title, key, scale in (("iterations", "iterations", "linear"), ("worst KKT residual", "kkt", "log"))]
+    return [(title, rows, points, dict(x=columns("contrast"), y=columns(key), by=columns("kind"), line=False, scale=scale,
+                                       labels=("contrast of the stiffness (1)", label)))
+            for title, label, key, scale in (("iterations", "iterations", "iterations", "linear"),
+                                             ("residuals", "worst relative KKT residual (1)", "kkt", "log"))]
 
 
 def conditioning(rows):
     of = groups(rows, columns("sweep"))
     tight = {sweep: [row for row in of[sweep] if row["tolerance"] == 1e-10] for sweep in of}
     exact = [row for row in of["incompressible"] if row["solver"] == "active-set"]
-    apart = "difference of u between solvers over"
+    apart = "relative difference of u between solvers (1)"
     return [
-        (f"soft hole: {apart} ζ₀ in it", tight["hole"], points,
-         dict(x=columns("parameter"), y=columns("difference"), by=columns("nx", "solver"))),
-        (f"slivers: {apart} the smallest angle (°)", tight["slivers"], points,
-         dict(x=columns("parameter"), y=columns("difference"), by=columns("case", "solver"))),
-        ("plane strain: error of u over ½ − ν", exact, points,
-         dict(x=lambda row: 0.5 - row["parameter"], y=columns("error"), by=columns("nx"))),
-        ("slender: iterations", of["slender"], cells,
-         dict(x=columns("case", "tolerance", "solver"), y=columns("parameter", "nx", "ny"), text=iterations)),
+        ("soft hole; lines: cells a side, solver", tight["hole"], points,
+         dict(x=columns("parameter"), y=columns("difference"), by=columns("nx", "solver"),
+              labels=("ζ₀ in the hole (1)", apart))),
+        ("slivers; lines: case, solver", tight["slivers"], points,
+         dict(x=columns("parameter"), y=columns("difference"), by=columns("case", "solver"),
+              labels=("smallest angle (°)", apart))),
+        ("plane strain; lines: cells a side", exact, points,
+         dict(x=lambda row: 0.5 - row["parameter"], y=columns("error"), by=columns("nx"),
+              labels=("½ − ν (1)", "relative error of u (1)"))),
+        ("slender bodies: iterations", of["slender"], cells,
+         dict(x=columns("case", "tolerance", "solver"), y=columns("parameter", "nx", "ny"), text=iterations,
+              labels=("case, tolerance, solver", "length/height, cells"))),
     ]
 
 
 def scales(rows):
-    return [("difference from the active set in SI units over gap/displacement", rows, points,
-             dict(x=columns("ratio"), y=columns("difference"), by=columns("kind", "solver"), line=False))]
+    return [("marks: body, solver", rows, points,
+             dict(x=columns("ratio"), y=columns("difference"), by=columns("kind", "solver"), line=False,
+                  labels=("gap/displacement (1)", "relative difference from the active set in SI units (1)")))]
 
 
 # Panels of each map, and how many of them stand side by side.
@@ -177,15 +197,17 @@ def draw(table, panels, across):
     rows = read_table(table)
     panels = panels(rows)
     down = -(-len(panels) // across)
-    figure, axes = plt.subplots(down, across, figsize=(7 * across, 1 + 3.6 * down), squeeze=False)
+    figure, axes = plt.subplots(down, across, figsize=(7 * across, 1 + 3.9 * down), squeeze=False,
+                                layout="constrained")
     for axis, (title, of, kind, options) in zip(axes.flat, panels):
         kind(axis, of, **options)
         axis.set_title(title, loc="left", fontsize=10)
     for axis in axes.flat[len(panels):]:
         axis.set_visible(False)
     counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in COLOURS}
-    figure.suptitle(", ".join(f"{n} {verdict}" for verdict, n in counts.items())
-                    + "; × refused, ring: wrong; * fallback or early claim, ° noted, – no answer", fontsize=10)
+    said = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+    said += "; × refused, ring: wrong; * fallback or early claim, ° noted, – no answer"
+    figure.suptitle("\n".join(wrapped(said, 6.8 * across)), fontsize=10)
     figure.savefig(table.with_suffix(".png"), dpi=110)
     plt.close(figure)
     print(table.with_suffix(".png"))

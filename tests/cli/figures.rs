@@ -98,7 +98,7 @@ fn the_foundation_is_drawn_where_it_is_at_the_time_of_the_picture() {
          from limits import limits_of\n\
          results = read_results(Path('out/plates'))\n\
          figure = draw_pressure(results, limits_of([results]))\n\
-         print([axes.get_title() for axes in figure.axes if axes.get_title()])\n\
+         print([axes.get_title('left') for axes in figure.axes if axes.get_title('left')])\n\
          print([len(curve.points) for curve in results.curves])\n\
          print([bool(curve.pressure.any()) for curve in results.curves])";
     let said = python(&directory, panels).expect("as before");
