@@ -232,33 +232,25 @@ def headline(results, text):
     return "\n".join(filter(None, (run, results.ending, text)))
 
 
-def amplification(size, largest):
-    """1, 2 or 5 times a power of ten with which `largest` appears as 4–10 % of `size`; 1 if it is visible anyway, above
-    2 %."""
-    wanted = 0.1 * size / largest if largest > 0.0 else 1.0
-    if wanted < 5.0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12))
-
-
 def draw_outline(axes, points, results, **style):
     """Draws the boundary of the body as continuous curves, so that dashes continue from edge to edge. `points` are
     the positions of the nodes."""
     axes.add_collection(LineCollection(results.outline(points), capstyle="round", **style))
 
 
-def draw_foundation(axes, results, factor=None):
-    """The obstacle as a thick line, hatched on its far side.
-
-    If displacements are amplified by `factor`, the distance from Γ_C is amplified, too. So the body touches the
-    obstacle where the gap is closed, and does not cross it.
-    """
+def draw_foundation(axes, results, factor=1.0):
+    """The obstacle as a thick line, hatched on its far side, for displacements amplified by `factor`."""
     for line in results.foundation(factor):
         # The body is on the left of the line, so the strokes go to the right.
         strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
         axes.plot(*line.T, color=INK, linewidth=0.8, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
+
+
+def draw_body(axes, results, factor):
+    """The outline and the foundation, displaced by `factor`; for 0 both are where they are without displacements."""
+    draw_outline(axes, results.places(factor), results, color=INK, linewidth=0.7)
+    draw_foundation(axes, results, factor or 1.0)
 
 
 def draw_colourbar(axes, image, extend="neither"):

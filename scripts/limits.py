@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drawing import amplification
-from setting import largest_load
+from results import amplification
+from setting import largest_load, near
 
 
 @dataclass
@@ -72,9 +72,11 @@ def limits_of(states, factor=None):
 
 def box_of(states, factor):
     """The lower left and the upper right corner of a box around the bodies, undeformed and deformed `factor` times,
-    and around their obstacles."""
-    points = np.vstack([points for state in states for points in (
-        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement), *state.foundation(factor))])
+    and around the near parts of their obstacles."""
+    bodies = np.vstack([points for state in states for points in (
+        state.nodes, state.pieces.at_points(state.nodes + factor * state.displacement))])
+    obstacles = np.vstack([bodies[:0], *(line for state in states for line in state.foundation(factor))])
+    points = np.vstack([bodies, near(obstacles, bodies)])
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 

@@ -6,7 +6,7 @@ from matplotlib.tri import Triangulation
 
 from bars import three_digits
 from drawing import (
-    BLUE, INK, OPTIONS, RED, Map, draw_colourbar, draw_foundation, draw_maps, draw_outline, draw_stress, draw_values,
+    BLUE, INK, OPTIONS, RED, Map, draw_body, draw_colourbar, draw_foundation, draw_maps, draw_outline, draw_stress, draw_values,
     headline, least_zeta, mesh_of, power_of, stress_colours, times_power,
 )
 from principal import principal_maps
@@ -29,14 +29,11 @@ def draw_mesh(results, figure=None):
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9)
 
     caption = headline(results, f"mesh: {len(results.pieces.elements)} triangles")
-    return draw_maps([Map("", _box(results), paint, has_bar=False)], caption, results.units, figure)
+    return draw_maps([Map("", results.box, paint, has_bar=False)], caption, results.units, figure)
 
 
 def draw_stress_and_damage(results, limits, figure=None):
-    """Von Mises stress beside the damage field, on the initial configuration (Figures 6 and 9).
-
-    For an undamaged body only the stress is drawn.
-    """
+    """Von Mises stress beside the damage field (Figures 6 and 9); for an undamaged body only the stress."""
     maps = [von_mises_map(results, limits)] + [damage_map(results, limits)] * limits.is_damaged
     return draw_maps(maps, headline(results, _with_circle(results, results.part)), results.units, figure)
 
@@ -50,8 +47,7 @@ def draw_everything(results, limits, figure=None):
 
 def draw_state(results, limits, figure=None):
     """The deformed body under its loads, coloured by its damage, or by its stress where there is no damage."""
-    moved = results.nodes + limits.factor * results.displacement
-    coloured = (damage_map if limits.is_damaged else von_mises_map)(results, limits, moved)
+    coloured = (damage_map if limits.is_damaged else von_mises_map)(results, limits, limits.factor)
 
     def paint(axes):
         coloured.paint(axes)
@@ -69,7 +65,7 @@ def deformed_map(results, limits):
 
     The obstacle is drawn opposite the nodes of Γ_C. Where displacements are amplified it seems to slide with them.
     """
-    moved = results.nodes + limits.factor * results.displacement
+    moved = results.places(limits.factor)
 
     def paint(axes):
         mesh = Triangulation(*results.pieces.at_points(moved).T, results.pieces.triangles)
@@ -84,48 +80,39 @@ def deformed_map(results, limits):
     return Map(title, limits.box, paint, has_bar=False)
 
 
-def von_mises_map(results, limits, at=None):
-    """The von Mises stress, with the nodes `at` these places."""
-    *_, factor, unit = stress_colours(results, limits.stress)
+def von_mises_map(results, limits, factor=None):
+    """The von Mises stress of the body, deformed by `factor`, or as `Results.factor` says."""
+    *_, size, unit = stress_colours(results, limits.stress)
     title, largest, is_singular = f"von Mises stress ({unit})", results.von_mises.max(), bool(results.singular())
     if OPTIONS.titles:
-        said = results.said("von_mises_max", largest, factor)
+        said = results.said("von_mises_max", largest, size)
         title += f", largest {said}" + ": singular (circle)" * (is_singular and largest > 0.0)
-    at = results.nodes if at is None else at
+    factor = results.factor if factor is None else factor
 
     def paint(axes):
+        at = results.places(factor)
         draw_stress(axes, mesh_of(results, at), results, results.von_mises, limits.stress)
-        _draw_body(axes, results, at, limits)
+        draw_body(axes, results, factor)
         if is_singular and largest:
             axes.plot(*at[results.von_mises.argmax()], marker="o", markersize=9, fillstyle="none", color=RED, zorder=5)
 
-    return Map(title, _box(results), paint)
+    return Map(title, results.box, paint)
 
 
-def damage_map(results, limits, at=None):
-    """The damage 1 − ζ from 0, sound, to the largest of the states, with the nodes `at` these places."""
+def damage_map(results, limits, factor=None):
+    """The damage 1 − ζ from 0, sound, to the largest of the states; see `von_mises_map`."""
     power = power_of(limits.damage)
     title = f"damage 1 − ζ{times_power(power)}"
     if OPTIONS.titles:
         title += f", least ζ {results.said('zeta_min', results.zeta.min(), plain=least_zeta)}"
-    at = results.nodes if at is None else at
+    factor = results.factor if factor is None else factor
 
     def paint(axes):
-        damage = (1.0 - results.pieces.at_points(results.zeta)) / 10.0**power
-        draw_colourbar(axes, draw_values(axes, mesh_of(results, at), damage, "magma", 0.0, limits.damage / 10.0**power))
-        _draw_body(axes, results, at, limits)
+        damage, mesh = (1.0 - results.pieces.at_points(results.zeta)) / 10.0**power, mesh_of(results, results.places(factor))
+        draw_colourbar(axes, draw_values(axes, mesh, damage, "magma", 0.0, limits.damage / 10.0**power))
+        draw_body(axes, results, factor)
 
-    return Map(title, _box(results), paint)
-
-
-def _draw_body(axes, results, at, limits):
-    """The outline and the foundation, for nodes that are not displaced, or by the amplification of the picture."""
-    draw_outline(axes, at, results, color=INK, linewidth=0.7)
-    draw_foundation(axes, results, None if at is results.nodes else limits.factor)
-
-
-def _box(results):
-    return np.array([results.nodes.min(axis=0), results.nodes.max(axis=0)])
+    return Map(title, results.box, paint)
 
 
 def _with_circle(results, text):

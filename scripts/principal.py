@@ -7,7 +7,7 @@ from matplotlib.path import Path
 
 import signorini_results
 from drawing import (
-    INK, OPTIONS, Map, draw_foundation, draw_maps, draw_outline, draw_stress, headline, mesh_of, stress_colours,
+    INK, OPTIONS, Map, draw_body, draw_maps, draw_stress, headline, mesh_of, stress_colours,
 )
 from limits import stress_top
 from results import ROUNDING
@@ -33,7 +33,6 @@ def principal_maps(results):
              ("compression", "principal_min", -results.principal[:, 1], 0)]
     parts = [(name, key, np.where(stress > noise, stress, 0.0), k) for name, key, stress, k in parts]
     least_top = 0.05 * max(stress_top(results, stress) for _, _, stress, _ in parts)
-    box = np.array([results.nodes.min(axis=0), results.nodes.max(axis=0)])
 
     def map_of(name, key, stress, k):
         top = max(stress_top(results, stress), least_top)
@@ -45,19 +44,18 @@ def principal_maps(results):
             title += f", largest {said}" + ": singular" * bool(results.singular(key)) if stress.any() else ": none"
 
         def paint(axes):
-            draw_stress(axes, mesh_of(results, results.nodes), results, stress, top)
+            draw_stress(axes, mesh_of(results, results.places(results.factor)), results, stress, top)
             _draw_lines(axes, results, k, top)
-            draw_outline(axes, results.nodes, results, color=INK, linewidth=0.7)
-            draw_foundation(axes, results)
+            draw_body(axes, results, results.factor)
 
-        return Map(title, box, paint)
+        return Map(title, results.box, paint)
 
     return [map_of(*part) for part in parts]
 
 
 def _principal_at(results, spacing):
-    """The points of a regular lattice in the shown part of the body, and the eigenvalues and eigenvectors of the
-    stresses there, in increasing order."""
+    """The points of a regular lattice in the shown part of the body, displaced, and the eigenvalues and eigenvectors of
+    the stresses there, in increasing order."""
     low, extent = results.nodes.min(axis=0), np.ptp(results.nodes, axis=0)
     counts = np.maximum(1, np.round(extent / spacing).astype(int))
     steps = (low[k] + (np.arange(count) + 0.5) * extent[k] / count for k, count in enumerate(counts))
@@ -65,7 +63,8 @@ def _principal_at(results, spacing):
     state = _frame_of(results.folder, results.time)
     triangles, barycentric = state.locate(points)
     points = points[results.shown[triangles] & np.isfinite(barycentric[:, 0])]
-    return points, *np.linalg.eigh(state.at(points, "stress")[:, [[0, 2], [2, 1]]])
+    moved = points + results.factor * state.at(points, "displacement")[:, :2]
+    return moved, *np.linalg.eigh(state.at(points, "stress")[:, [[0, 2], [2, 1]]])
 
 
 @lru_cache(maxsize=1)
@@ -84,7 +83,7 @@ def _draw_lines(axes, results, k, top):
     are_seen = part > 0.1
     points, half = points[are_seen], 0.45 * longest * (part[:, None] * directions[:, :, k])[are_seen]
     ends = np.stack((points - half, points + half, np.full_like(points, np.nan)), axis=1)
-    body = Path.make_compound_path(*map(Path, results.outline(results.nodes)))
+    body = Path.make_compound_path(*map(Path, results.outline(results.places(results.factor))))
     for colour, width in (("white", 1.8), (INK, 0.8)):
         axes.plot(*ends.reshape(-1, 2).T, color=colour, linewidth=width, zorder=3, solid_capstyle="round",
                   clip_path=(body, axes.transData))

@@ -7,7 +7,7 @@ import zlib
 from collections import defaultdict
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import groupby
 from pathlib import Path
 
@@ -16,10 +16,8 @@ import numpy as np
 
 import signorini_results
 from elements import Pieces, counter_clockwise
+from expressions import evaluate
 from results import ContactCurve, ResultError, Results, of_material, read_table, without_roundoff
-
-# A node without a condition.
-NOWHERE = np.zeros(2), np.zeros(2)
 
 
 @contextmanager
@@ -121,6 +119,12 @@ def _foundation(results, time, displacement):
     A node x with the gap g along ν is opposite the point x + g ν. A corner has two normals and gaps: its opposite point
     is x + d with d·ν = g for both, and it does not slide.
     """
+    def prescribed(of, node, edge_normal):
+        # A prescribed node has no row in contact.csv, but a gap in the scene.
+        at = partial(evaluate, points=node[None], t=time, folder=results.folder)
+        normal = np.ravel([at(part) for part in of["normal"]]) if "normal" in of else edge_normal
+        return at(of["gap"]) * normal / np.linalg.norm(normal), np.zeros(2)
+
     displacements = dict(zip(map(tuple, results.nodes.tolist()), displacement))
     conditions = defaultdict(list)
     for row in _contact_rows(results.folder / "contact.csv").get(time, []):
@@ -137,15 +141,13 @@ def _foundation(results, time, displacement):
         (x, y), gap = max(found, key=lambda condition: condition[0] @ edge_normal)
         return np.array([gap * x, gap * y]), np.array([-y, x])
 
-    names = [of["name"] for of in results.scene.get("boundary", []) if "gap" in of]
-    edges = [edge for name in names for edge in results.summary["boundaries"].get(name, [])]
     ends = []
-    for a, b in np.array(edges).reshape(-1, 2, 2):
-        normal = np.array([b[1] - a[1], a[0] - b[0]])
-        first, second = (opposite(tuple(node), normal) for node in (a.tolist(), b.tolist()))
-        # A prescribed node has no gap condition; its gap is that of its neighbour.
-        found = [first or second or NOWHERE, second or first or NOWHERE]
-        ends.append([[node, tangent, node + way] for node, (way, tangent) in zip((a, b), found)])
+    for of in results.scene.get("boundary", []):
+        for a, b in np.array(results.summary["boundaries"].get(of["name"], []) * ("gap" in of)).reshape(-1, 2, 2):
+            normal = np.array([b[1] - a[1], a[0] - b[0]])
+            for node in (a, b):
+                way, tangent = opposite(tuple(node.tolist()), normal) or prescribed(of, node, normal)
+                ends.append([node, tangent, node + way])
     return np.array(ends).reshape(-1, 2, 3, 2).transpose(2, 0, 1, 3)
 
 

@@ -226,25 +226,50 @@ class Results:
             joined += zip(ends, ends[1:])
         return [np.array([at[end] for end in path]) for path in paths(joined)]
 
+    @property
+    def box(self):
+        """Two corners of the body, displaced by `factor`, and of the undeformed one."""
+        points = np.vstack([self.nodes, self.places(self.factor)])
+        return np.array([points.min(axis=0), points.max(axis=0)])
+
+    @property
+    def factor(self):
+        """1 if maps of fields show the body deformed, which they do where displacements are seen to scale: the initial
+        body would cross a foundation that has moved as far. Else 0."""
+        largest = np.linalg.norm(self.displacement, axis=1).max()
+        return 1.0 if largest > 0.0 and amplification(self.size, largest) == 1.0 else 0.0
+
+    def places(self, factor):
+        """The nodes, displaced by `factor`."""
+        return self.nodes + factor * self.displacement
+
     def displacement_at(self, points):
         """The displacements of nodes at points."""
         nodes, wanted = self.nodes @ (1.0, 1.0j), points @ (1.0, 1.0j)
         order = np.argsort(nodes)
         return self.displacement[order[np.searchsorted(nodes[order], wanted)]]
 
-    def foundation(self, factor=None):
+    def foundation(self, factor=1.0):
         """The obstacle as polylines, for displacements amplified by `factor`.
 
-        A node of Γ_C touches the obstacle if u·ν = g. So its opposite point moves to x + factor (g ν + (u·τ) τ): it
-        follows the sliding of the body.
+        To scale, the point opposite a node x of Γ_C is x + g ν. A node touches the obstacle if u·ν = g. So that it also
+        does so amplified, the distance is amplified, and the point follows the sliding of the body, as far as this is
+        amplified: x + factor g ν + (factor − 1) (u·τ) τ.
         """
-        lines = self.obstacle
-        if factor is not None:
-            u = self.displacement_at(self.contact)
-            sliding = (u * self.tangents).sum(axis=2, keepdims=True) * self.tangents
-            lines = self.contact + factor * (self.obstacle - self.contact + sliding)
+        sliding = (self.displacement_at(self.contact) * self.tangents).sum(axis=2, keepdims=True) * self.tangents
+        lines = self.contact + factor * (self.obstacle - self.contact) + (factor - 1.0) * sliding
         lines = np.round(lines, 12)
         return [np.array(path) for path in paths([tuple(map(tuple, l)) for l in lines.tolist()])]
+
+
+def amplification(size, largest):
+    """1, 2 or 5 times a power of ten with which `largest` appears as 4–10 % of `size`; 1 if it is visible anyway, above
+    2 %."""
+    wanted = 0.1 * size / largest if largest > 0.0 else 1.0
+    if wanted < 5.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12))
 
 
 def of_material(results):

@@ -15,10 +15,13 @@ from drawing import (
     room_for_legend, wide, width_of, wrapped,
 )
 from expressions import evaluate
+from reading import states
 from results import paths
 
 # Relative to the size of the body: the longest arrow, and the distances between arrows and between rollers.
 ARROW, SPACING, ROLLERS = 0.12, 0.05, 0.03
+# Obstacles at a larger distance from the body are cut off, relative to its size.
+FAR = 0.25
 # Light colours of materials.
 MATERIALS = ("#edf1f5", "#f3e3c3", "#d5e8d4", "#e6d5ec", "#f7d4cd", "#cfe3f2")
 # The distance of names from their boundaries, inches.
@@ -26,7 +29,7 @@ AWAY = 0.13
 
 
 def draw_setting(results, _limits, figure=None):
-    """The body with its boundaries named, tractions as arrows, supports, and the foundation.
+    """The body with its boundaries named, tractions as arrows, supports, and the foundation at the start.
 
     Clamps are hatched. Rollers mark boundaries with one prescribed component, and axes of symmetry. The legend
     lists the conditions with the values of the scene. None if the folder lacks the scene.
@@ -34,12 +37,13 @@ def draw_setting(results, _limits, figure=None):
     conditions, curves = _conditions(results), _curves(results)
     if not conditions or not curves:
         return None
+    start = states(results, results.frames[:1])[0]
     time, tractions = _loads(results, curves)
     largest = max([np.linalg.norm(force, axis=-1).max() for force in tractions], default=0.0)
     size, units = results.size, results.units
     arrows = [force * ARROW * size / (largest or 1.0) for force in tractions]
     outer = [np.vstack([_outside(line, conditions.get(name, {}), size), _tails(line, force, size)[0],
-                        *_opposite(results, line)]) for (name, line), force in zip(curves, arrows)]
+                        near(_opposite(start, line), results.nodes)]) for (name, line), force in zip(curves, arrows)]
     # About the length of an inch of the picture, m.
     room = wide(7.2) - 1.5, OPTIONS.height - 2.0
     inch = (np.ptp(np.vstack([results.nodes, *outer]), axis=0) / room).max()
@@ -56,7 +60,7 @@ def draw_setting(results, _limits, figure=None):
         else:
             _draw_materials(axes, results)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
-        draw_foundation(axes, results)
+        draw_foundation(axes, start)
         for (name, line), force, (place, style, _) in zip(curves, arrows, names):
             condition = conditions.get(name, {})
             _draw_support(axes, line, condition, size)
@@ -237,9 +241,14 @@ def _draw_body_force(axes, results, time):
 
 def _opposite(results, line):
     """The points of the obstacle opposite a part of the boundary."""
-    ends = set(map(tuple, line.tolist()))
-    pairs = zip(results.contact.reshape(-1, 2).tolist(), results.obstacle.reshape(-1, 2))
-    return [opposite for end, opposite in pairs if tuple(end) in ends]
+    is_end = np.isin(results.contact.reshape(-1, 2) @ (1.0, 1.0j), line @ (1.0, 1.0j))
+    return results.obstacle.reshape(-1, 2)[is_end]
+
+
+def near(points, body):
+    """Points that are moved as near to the points of a body as pictures show."""
+    low, high = body.min(axis=0), body.max(axis=0)
+    return np.clip(points, low - FAR * max(high - low), high + FAR * max(high - low))
 
 
 def _place_of_name(line, name, others, inch, taken):
