@@ -2,14 +2,13 @@
 
 import numpy as np
 
-from bars import three_digits
 from drawing import (
     AROUND_PLOTS, BAR, BLUE, FAINT, OPTIONS, along, canvas, draw_colourbar, em, headline, power_of, stress_unit,
     times_power, wide,
 )
 
 # The least width of a panel, in the size of letters; panels of many boundaries stand in several rows.
-LEAST = 9.0
+LEAST = 7.5
 
 
 def draw_pressure(results, limits, figure=None):
@@ -24,7 +23,7 @@ def draw_pressure(results, limits, figure=None):
     lines = -(-len(curves) // count)
     panel = (width - left - count * right) / count
     # Pictures of one row are as high as other plots.
-    high = max(min(3.0, 0.42 * width) if lines == 1 else 0.0, 13.0 * em())
+    high = max(min(3.0, 0.42 * width) if lines == 1 else 0.0, 10.0 * em())
     pressure, gap = 0.7 * high, 0.3 * high
     columns = [(left, panel, right)] + [(0.0, panel, right)] * (count - 1)
     rows = [(top, pressure, 1.8 * em()), (0.0, gap, bottom)] * lines
@@ -60,7 +59,7 @@ def _contact(results, limits, factor, unit):
     text = f"contact at {results.moment}; filled: {results.active} of {results.summary.get('contact_nodes', '?')} nodes"
     largest = results.pressure.max()
     if largest > limits.pressure > 0.0:
-        text += f"; the pressure goes up to {three_digits(largest / factor)} {unit}"
+        text += f"; the pressure goes up to {results.said('pressure_max', largest, factor)} {unit}"
     return text
 
 

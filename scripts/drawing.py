@@ -58,7 +58,7 @@ plt.rcParams.update({
 # points, or None for one that suits the width; the largest height of maps, inches; whether they have titles, and in these the name of the run; whether maps have contour lines; the column
 # of history.csv over which forces are drawn, and the smallest and the largest stress of the colours, Pa, or None to
 # choose.
-OPTIONS = SimpleNamespace(width=None, size=None, height=8.0, titles=True, head=True, contours=False, abscissa=None, range=None)
+OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None, range=None)
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
 # top, bottom), in the size of letters.
 LINE = 1.35
@@ -147,7 +147,7 @@ def canvas(columns, rows, caption="", titles=(), below=0.0, figure=None):
         left, box, _ = columns[k % count]
         # With a given y, matplotlib does not measure everything above the axes.
         of.set_title("\n".join(title), loc="left", x=(0.6 * em() - left) / box if count > 1 else 0.0, y=1.0,
-                     parse_math=False, linespacing=1.15)
+                     pad=9.0, parse_math=False, linespacing=1.15)
     return page, axes
 
 
@@ -327,7 +327,7 @@ def legend(axes, below, **style):
     size, left = _size_of(axes), AROUND_PLOTS[0] * em()
     columns = legend_columns(axes.get_legend_handles_labels()[1], wide(NARROWEST))
     axes.legend(loc="upper left", bbox_to_anchor=((0.6 * em() - left) / size[0], -3.8 * em() / size[1]), ncols=columns,
-                borderaxespad=0.0, borderpad=0.0, fontsize="small", labelspacing=0.3, handletextpad=0.4,
+                borderaxespad=0.0, borderpad=0.0, fontsize="small", labelspacing=0.3, handletextpad=0.8,
                 columnspacing=1.0, **{"handlelength": 1.6, **style})
 
 

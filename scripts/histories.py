@@ -105,44 +105,21 @@ def _along_largest(x, y):
     return (x * x[k] + y * y[k]) / size[k]
 
 
-# Panels of the figure of all histories: title, columns with their names, logarithmic or not.
-PANELS = (
-    ("largest displacement ({length})", {"displacement_max": ""}, False),
-    ("work of the loads ({work})", {"work": ""}, False),
-    ("sum of the contact reactions ({line})", {"contact_force": ""}, False),
-    ("active nodes", {"active_nodes": ""}, False),
-    ("KKT residuals", {f"kkt_{kind}": kind for kind in (
-        "stationarity", "primal", "dual", "complementarity")}, True),
-    ("iterations", {"iterations": "of contact", "linear_iterations": "linear"}, False),
-    ("error bound of ζ from its linear system", {"zeta_error": ""}, True),
-    ("seconds per step", {"seconds": ""}, True),
-)
-
-
 def draw_histories(results):
-    """Draws the columns of history.csv in panels; None without time steps."""
+    """The figures of the whole body in time, a panel each; None without time steps."""
     history = results.history
     if len(history.get("time", [])) < 3:
         return None
-    panels = [(title, {k: v for k, v in columns.items() if k in history}, is_log) for title, columns, is_log in PANELS]
-    panels = [panel for panel in panels if any(np.nanmax(history[k]) > 0.0 for k in panel[1])]
+    figures = [(of, history[name]) for name, of in results.summary.get("figures", {}).items()
+               if "." not in name and name in history and np.nanmax(np.abs(history[name]), initial=0.0) > 0.0]
+    powers = [power_of(np.nanmax(np.abs(values))) for _, values in figures]
     left, right, top, bottom = (em() * of for of in AROUND_PLOTS)
-    figure, grid = canvas([(left, 4.8 - left - right, right)] * 2, [(top, 1.3, bottom)] * ((len(panels) + 1) // 2),
-                          titles=[title.format(**results.units) for title, *_ in panels])
-    for axes, (title, columns, is_log) in zip(grid, panels):
-        for column, name in columns.items():
-            values = history[column]
-            largest = np.nanmax(np.abs(values))
-            if is_log:
-                values = np.where(values > 0.0, values, np.nan)
-            else:
-                values = np.where(np.abs(values) <= ROUNDING * largest, 0.0, values)
-            if np.isfinite(values).any():
-                axes.plot(history["time"], values, linewidth=1.2, label=name)
-        axes.set_yscale("log" if is_log else "linear")
+    figure, grid = canvas([(left, 4.8 - left - right, right)] * 2, [(top, 1.3, bottom)] * ((len(figures) + 1) // 2),
+                          titles=[of["label"] + times_power(power, of["unit"]) for (of, _), power in zip(figures, powers)])
+    for axes, (_, values), power in zip(grid, figures, powers):
+        axes.plot(history["time"], values / 10.0**power, color=BLUE, linewidth=1.2)
         axes.set_xlabel(f"time t ({results.units['time']})")
-        if any(columns.values()):
-            axes.legend(fontsize=8, ncols=2, loc="best")
-    for axes in grid[len(panels):]:
+        axes.yaxis.get_major_formatter().set_useOffset(False)
+    for axes in grid[len(figures):]:
         axes.remove()
     return figure

@@ -12,6 +12,7 @@ import io
 import json
 import multiprocessing
 import os
+import re
 import sys
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from functools import partial
@@ -123,72 +124,68 @@ def template():
 def said(figure, value):
     """A value of a figure as text: with its bar if it is that of the last state, and with two digits and the reason if
     the mesh does not determine it."""
+    if value is None:
+        return "–"
     flag, _ = flag_of(figure)
     if flag:
         return f"{value:.2g}, {flag}"
-    bar = figure["bar"] if value == figure["value"] else None
-    return barred(value, bar) or f"{float(f'{value:.4g}'):g}"
+    return value == figure["value"] and barred(value, figure["bar"]) or f"{float(f'{value:.4g}'):g}"
 
 
 def governing(results):
-    """The extreme values of the run: of each figure of the whole body its name, value, unit, time, place, the value of
-    the last state if it is another one, and why the mesh does not determine it."""
-    rows, unit = [], results.units["time"]
+    """Of each figure of the whole body: its name, its extreme over all steps, the unit, the time and the place, the value
+    of the last state if it is another one, and why the mesh does not determine it; below a head."""
+    rows, is_stopped = [], results.summary.get("stopped_by") == "damage"
     for name, figure in results.summary.get("figures", {}).items():
-        value, time = figure["governing"]["value"], figure["governing"]["time"]
-        if "." in name or value is None:
+        extreme = figure["governing"]
+        if "." in name or extreme is None:
             continue
-        is_last = value == figure["value"]
-        place = figure["at"] if is_last else None
-        text, last = said(figure, value), "" if is_last else said(figure, figure["value"])
-        if name == "zeta_min" and results.summary.get("stopped_by") == "damage":
-            text, last, time = "reached ζ_*", said(figure, figure["value"]), None
-        rows.append((figure["label"], text, figure["unit"], results.stopping_time if time is None else f"{time:g}",
-                     f"({place[0]:.4g}, {place[1]:.4g})" if place else "", last, flag_of(figure)[1]))
+        text, last, place = said(figure, extreme["value"]), said(figure, figure["value"]), extreme["at"]
+        time = results.when(extreme["time"])
+        if name == "zeta_min" and is_stopped:
+            text, time = "reached ζ_*", results.stopping_time
+        rows.append((figure["label"], text, figure["unit"], time, f"({place[0]:.4g}, {place[1]:.4g})" if place else "",
+                     last * (last != text), flag_of(figure)[1]))
     before = ", before the stop" if results.summary.get("stopped_by") else ""
-    return _filled(("", "over all steps", "", f"at t ({unit})", f"at ({results.units['length']})", f"last state{before}",
-                    "why not determined"), rows)
+    head = ("", "over all steps", "", f"at t ({results.units['time']})", f"at ({results.units['length']})",
+            f"last state{before}", "why not determined")
+    shown = [k for k in range(len(head)) if k == 0 or any(row[k] for row in rows)]
+    return [[row[k] for k in shown] for row in rows], [head[k] for k in shown]
 
 
-def by_name(results):
-    """Tables of the figures of supports, probes and materials: a row for each name, and two where the largest value of
-    the run is not that of the last state; a column for each figure, or for each pair of components."""
-    figures = results.summary.get("figures", {})
-    names = {}
-    for key in figures:
-        name, point, figure = key.rpartition(".")
-        if point:
-            names.setdefault(name, []).append(figure)
-    tables = {}
-    for name, keys in names.items():
-        tables.setdefault(tuple(keys), []).append(name)
-    for keys, group in tables.items():
-        pairs = {key: (key, f"{key[:-1]}y") for key in keys if key.endswith("_x") and f"{key[:-1]}y" in keys}
-        columns = [pairs.get(key, (key,)) for key in keys if not (key.endswith("_y") and f"{key[:-1]}x" in pairs)]
+def by_name(results, with_places=True):
+    """Tables of the figures of supports, probes and materials: a row for each name, and two where the extreme of the run
+    is not the value of the last state; a column for each figure, or for both components. Places have no extremes."""
+    figures, names, alike = results.summary.get("figures", {}), {}, {}
+    for key, of in figures.items():
+        name, point, kind = key.rpartition(".")
+        if point and (with_places or of["governing"]):
+            names.setdefault(name, []).append(kind)
+    for name, kinds in names.items():
+        alike.setdefault(tuple(kinds), []).append(name)
+    for kinds, group in alike.items():
+        pairs = {kind: f"{kind[:-1]}y" for kind in kinds if kind.endswith("_x") and f"{kind[:-1]}y" in kinds}
+        columns = [(kind, pairs[kind]) if kind in pairs else (kind,) for kind in kinds if kind not in pairs.values()]
+        first = [(figures[f"{group[0]}.{column[0]}"], len(column)) for column in columns]
+        of_name = re.compile(rf" (of|at|in) {re.escape(group[0])}(?!\w)")
+        head = [f"{of_name.sub('', of['label'])[:-3 if count == 2 else None]} ({of['unit']})" for of, count in first]
         rows = []
         for name in group:
-            cells = [[figures[f"{name}.{key}"] for key in column] for column in columns]
-            rows.append([name, *(_cell([(of, of["value"]) for of in cell]) for cell in cells)])
-            largest = [_cell([(of, of["governing"]["value"]) for of in cell]) for cell in cells]
-            times = [", ".join(dict.fromkeys(f"{of['governing']['time']:g}" for of in cell)) for cell in cells]
-            shown = [f"{text} at t = {time}" * (text != last) for text, time, last in zip(largest, times, rows[-1][1:])]
-            rows += [["   largest", *shown]] * any(shown)
-        of_first = [figures[f"{group[0]}.{column[0]}"] for column in columns]
-        heads = [f"{of['label'].replace(f' of {group[0]}', '').removesuffix(', x')} ({of['unit']})".replace(" ()", "")
-                 for of in of_first]
-        yield ["", *heads], rows
+            cells = [[figures[f"{name}.{kind}"] for kind in column] for column in columns]
+            last = [_cell((of, of["value"]) for of in cell) for cell in cells]
+            extremes = [[(of, of["governing"]) for of in cell if of["governing"]] for cell in cells]
+            most = [_cell((of, extreme["value"]) for of, extreme in cell) for cell in extremes]
+            times = [", ".join(dict.fromkeys(results.when(extreme["time"]) for _, extreme in cell)) for cell in extremes]
+            shown = [f"{text} at t = {time}" * (text not in ("", value))
+                     for text, time, value in zip(most, times, last)]
+            rows += [[name, *last]] + [["   extreme", *shown]] * any(shown)
+        yield rows, ["", *(text.replace(" ()", "") for text in head)]
 
 
 def _cell(parts):
     """A value, or a pair of components."""
     texts = [said(*part) for part in parts]
-    return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
-
-
-def _filled(head, rows):
-    """The head and the rows without columns that are empty."""
-    chosen = [k for k in range(len(head)) if any(row[k] for row in rows)]
-    return [head[k] for k in chosen], [[row[k] for k in chosen] for row in rows]
+    return f"({', '.join(texts)})" if len(texts) > 1 else "".join(texts)
 
 
 def body(results):
@@ -205,7 +202,7 @@ def body(results):
 def run_of(summary):
     """The size and the solver of the run."""
     names = {"solver": "contact solver", "ranks": "ranks", "nodes": "nodes", "triangles": "triangles",
-             "contact_nodes": "contact nodes", "active_nodes": "active nodes", "steps": "time steps", "end_time": "last time"}
+             "contact_nodes": "contact nodes", "active_nodes": "active nodes", "steps": "time steps"}
     return [(name, summary[key]) for key, name in names.items() if summary.get(key) is not None]
 
 
@@ -258,8 +255,8 @@ def page(results, arguments, everything):
         title=title,
         byline=byline,
         model=MODEL,
-        governing=table(*governing(results)[::-1]),
-        by_name="".join(table(rows, head) for head, rows in by_name(results)),
+        governing=table(*governing(results)),
+        by_name="".join(table(*of) for of in by_name(results)),
         body=table(body(results)),
         subtitle=subtitle,
         ending=ending,
@@ -290,13 +287,12 @@ def write_pdf(path, results, arguments, everything):
         pages.text(ending, color=RED, weight="bold")
         errors = errors_of(summary)
         pages.table("Body, materials, and estimated relative errors", body(results) + [("", "")] * bool(errors) + errors)
-        drawing.use(size=SIZE, width=pages.beside if pages.beside > 2.5 else FULL, height=2.8)
+        drawing.use(size=SIZE, width=pages.beside if pages.beside > 2.5 else FULL, height=2.6)
         draw["setting"](figure=pages)
         pages.new_line()
-        head, rows = governing(results)
-        pages.table("Governing values", rows, head)
+        pages.table("Governing values", *governing(results))
         title = "Supports, probes, materials"
-        for head, rows in by_name(results):
+        for rows, head in by_name(results, with_places=False):
             pages.new_line()
             pages.table(title, rows, head)
             title = ""

@@ -13,6 +13,8 @@ WIDTH, HEIGHT, MARGIN, SPACE = 8.27, 11.69, 0.6, 0.15
 FULL = WIDTH - 2 * MARGIN
 # The size of letters, points, and the height of a line, inches.
 SIZE, LINE = 8, 0.155
+# Tables that are wider than a page by up to this factor have smaller letters.
+WIDEST = 1.3
 
 
 class Pages:
@@ -74,33 +76,33 @@ class Pages:
 
     def table(self, title, rows, head=()):
         """A block with a title and rows of cells, below a head if there is one. Columns are as wide as their widest
-        cells; those that do not fit stand below the others, with the first column again."""
+        cells. If the table is too wide, its letters are smaller, or columns stand below the others, with the first
+        column again."""
         cells = [[text_of(cell) for cell in row] for row in rows]
         columns = [list(column) for column in zip(*cells)]
         widths = [max(width_of(cell, SIZE) for cell in column) + 0.15 for column in columns]
         if head:
             widths = [max(width, min(width_of(name, SIZE) + 0.15, 1.0)) for width, name in zip(widths, head)]
+        size = FULL / sum(widths) if FULL < sum(widths) <= WIDEST * FULL else 1.0
         while columns:
             count = len(columns)
-            while count > 2 and sum(widths[:count]) > FULL:
+            while count > 2 and size * sum(widths[:count]) > FULL + 1e-9:
                 count -= 1
-            self._part(title, columns[:count], widths[:count], head[:count])
+            self._part(title, columns[:count], widths[:count], head[:count], size)
             title = ""
             columns, widths, head = ([of[0], *of[count:]] if count < len(of) else [] for of in (columns, widths, head))
 
-    def _part(self, title, columns, widths, head):
-        heads = [wrapped(name, width - 0.1, SIZE) for name, width in zip(head, widths)]
-        first = 1.4 * bool(title)
-        above = first + max(map(len, heads), default=0)
-        height = (len(columns[0]) + above) * LINE
-        _, x, y = self.place(max(sum(widths), width_of(title, SIZE) * 1.4), height)
+    def _part(self, title, columns, widths, head, size):
+        heads, line = [wrapped(name, width - 0.1, SIZE) for name, width in zip(head, widths)], size * LINE
+        first, above = 1.4 * LINE * bool(title), line * max(map(len, heads), default=0)
+        _, x, y = self.place(max(size * sum(widths), width_of(title, SIZE) * 1.4), first + above + len(columns[0]) * line)
         self.write(x, y, title, size=1.2 * SIZE, weight="bold", color=INK)
         for k, (column, width) in enumerate(zip(columns, widths)):
-            for line, text in enumerate(heads[k] if heads else ()):
-                self.write(x, y + (first + line) * LINE, text, color="#66707a")
-            for line, cell in enumerate(column):
-                self.write(x, y + (above + line) * LINE, cell)
-            x += width
+            for number, text in enumerate(heads[k] if heads else ()):
+                self.write(x, y + first + number * line, text, size * SIZE, color="#66707a")
+            for number, cell in enumerate(column):
+                self.write(x, y + first + above + number * line, cell, size * SIZE)
+            x += size * width
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import numpy as np
 from bars import barred, three_digits
 from elements import Pieces
 from signorini_results import paths
-from signorini_summaries import bars, option_of, units_of
+from signorini_summaries import flag_of, option_of, units_of
 from table import write_table  # noqa: F401
 
 # Values below these parts of the maximum of a run are rounding errors (the solver's tolerance is 1e-10).
@@ -108,9 +108,15 @@ class Results:
 
     @property
     def moment(self):
-        """The time of the state, for titles. The last state before a stop has a computed time, which is not exact."""
-        is_exact = self.summary.get("stopped_at") is None or not self.is_last
-        return f"t = {f'{self.time:g}' if is_exact else three_digits(self.time)} {self.units['time']}"
+        """The time of the state, for titles."""
+        if self.is_last and self.summary.get("stopped_by"):
+            return f"the last state before t = {self.stopping_time} {self.units['time']}"
+        return f"t = {self.time:g} {self.units['time']}"
+
+    def when(self, time):
+        """A time of the run as text. The last one before a stop is computed, and not exact."""
+        is_exact = not self.summary.get("stopped_by") or time != self.summary["end_time"]
+        return f"{time:g}" if is_exact else self.stopping_time
 
     @property
     def part(self):
@@ -119,8 +125,9 @@ class Results:
 
     @property
     def stopping_time(self):
-        """The time at which the run stopped, s, as text."""
-        return self.barred("stopped_at", self.summary["stopped_at"]) or three_digits(self.summary["stopped_at"])
+        """The time at which the run stopped, as text."""
+        time = self.summary["stopped_at"]
+        return barred(time, self.summary.get("stopped_uncertainty")) or three_digits(time)
 
     @property
     def ending(self):
@@ -184,13 +191,17 @@ class Results:
         """Whether this is the last state of the run."""
         return self.time == self.frames[-1][0]
 
-    def barred(self, name, value):
-        """A figure of the last state with its error bar; None at other times, or without one."""
-        return barred(value, bars(self.summary).get(name)) if self.is_last else None
-
     def said(self, name, value, factor=1.0, plain=three_digits):
-        """A figure of this state over `factor` as text, with its error bar if it has one."""
-        bar = bars(self.summary).get(name) if self.is_last else None
+        """A figure of this state over `factor` as text, with its error bar if it has one, and with two digits if the mesh
+        does not determine it; the `value` of the frame if the history lacks the figure."""
+        figure = self.summary.get("figures", {}).get(name) or {}
+        if self.is_last and figure:
+            value = figure["value"]
+        elif (column := f"{self.material}.{name}" if self.material else name) in self.history:
+            value = self.history[column][self.step]
+        if flag_of(figure)[0]:
+            return f"{float(f'{value / factor:.2g}'):g}"
+        bar = figure.get("bar") if self.is_last else None
         return barred(value / factor, bar and bar / abs(factor)) or plain(value / factor)
 
     def singular(self, name="von_mises_max"):
@@ -199,11 +210,14 @@ class Results:
         return largest.get("singular") if self.is_last else None
 
     @property
+    def step(self):
+        """The row of the state in the history."""
+        return np.abs(self.history["time"] - self.time).argmin()
+
+    @property
     def active(self):
-        """The number of active nodes from the history; None if the history lacks it."""
-        times = self.history.get("time", [])
-        found = np.flatnonzero(np.isclose(times, self.time, rtol=1e-12, atol=0.0))
-        return int(self.history["active_nodes"][found[-1]]) if len(found) else None
+        """The number of active nodes; None if the history lacks it."""
+        return int(self.history["active_nodes"][self.step]) if "active_nodes" in self.history else None
 
     @property
     def unloaded(self):

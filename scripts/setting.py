@@ -44,13 +44,18 @@ def draw_setting(results, _limits, figure=None):
     arrows = [force * ARROW * size / (largest or 1.0) for force in tractions]
     outer = [np.vstack([_outside(line, conditions.get(name, {}), size), _tails(line, force, size)[0],
                         near(_opposite(start, line), results.nodes)]) for (name, line), force in zip(curves, arrows)]
-    # About the length of an inch of the picture, m.
-    room = wide(7.2) - 1.5, OPTIONS.height - 2.0
-    inch = (np.ptp(np.vstack([results.nodes, *outer]), axis=0) / room).max()
-    names = []
-    for (name, line), beyond in zip(curves, outer):
-        names.append(_place_of_name(line, name, beyond, inch, [box for *_, box in names]))
-    points = np.vstack([results.nodes, *outer, *(box for *_, box in names)])
+    entries, probes = _entries(results), results.scene.get("probe", [])
+    below = room_for_legend([words for _, words in entries], always=True)
+    room = wide(7.2) - 8.0 * em(), OPTIONS.height - below - 5.0 * em()
+    points = np.vstack([results.nodes, *outer])
+    # The length of an inch of the picture, m, follows from its box, and the box from the names.
+    for _ in range(3):
+        inch, names = (1.1 * np.ptp(points, axis=0) / room).max(), []
+        taken = [np.add(of["point"], inch * np.array([[0.0, 0.0], [width_of(of["name"]), 2.0 * em()]])) for of in probes]
+        for (name, line), beyond in zip(curves, outer):
+            names.append(_place_of_name(line, name, beyond, inch, taken))
+            taken.append(names[-1][-1])
+        points = np.vstack([results.nodes, *outer, *taken])
 
     def paint(axes):
         # The body is on the left of its outlines, so the outlines of holes cut them out.
@@ -66,7 +71,7 @@ def draw_setting(results, _limits, figure=None):
             _draw_support(axes, line, condition, size)
             _draw_traction(axes, line, force, size)
             axes.text(*place, name, color=_colour(condition), zorder=5, parse_math=False, **style)
-        for probe in results.scene.get("probe", []):
+        for probe in probes:
             axes.plot(*probe["point"], marker="+", color=INK, zorder=4)
             axes.annotate(probe["name"], probe["point"], xytext=(4, 4), textcoords="offset points", fontsize="small",
                           path_effects=[withStroke(linewidth=2.5, foreground="white")], zorder=4.5)
@@ -75,8 +80,6 @@ def draw_setting(results, _limits, figure=None):
             axes.plot([], [], color=colour, linewidth=4, label=words.replace("$", r"\$"))
         legend(axes, below, handlelength=1)
 
-    entries = _entries(results)
-    below = room_for_legend([words for _, words in entries], always=True)
     loads = f"; loads at {replace(results, time=time).moment}" if largest or "body" in results.scene else ""
     box = np.array([points.min(axis=0), points.max(axis=0)])
     return draw_maps([Map("", box, paint, has_bar=False)], headline(results, f"setting{loads}"), units, figure, below)

@@ -173,7 +173,7 @@ class Study:
         # This compiles the forms.
         self.timed([*command, "--steps", 1])
         seconds, said = self.timed([*command, "--steps", steps])
-        ours, theirs = self.last.summary["figures"]["work"]["value"], json.loads(said.strip().splitlines()[-1])["work"]
+        ours, theirs = self.last.figures["work"]["value"], json.loads(said.strip().splitlines()[-1])["work"]
         if abs(theirs - ours) > 1e-6 * abs(ours):
             raise SceneError(f"the work of the loads is {theirs}, but {ours} by signorini: another answer")
         return {**self.rows[-1], "run": str(choice), "solver": FENICSX, "seconds": seconds}

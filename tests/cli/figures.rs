@@ -150,6 +150,147 @@ fn a_body_without_damage_is_not_told_of_damage() {
     assert!(!directory.names("out/scene").iter().any(|name| name == "stress.gif"));
 }
 
+/// A block, `WIDTH` by `HEIGHT`, on `PIERS` piers.
+const PIERS: &str = r#"DefineConstant[ width = 6, height = 1, piers = 1, size = 0.25 ];
+n = 2*piers - 1;
+For k In {0:n}
+  Point(k + 1) = {width*k/n, 0, 0, size};
+EndFor
+For k In {1:n}
+  Line(k) = {k, k + 1};
+EndFor
+Point(101) = {width, height, 0, size};
+Point(102) = {0, height, 0, size};
+Line(101) = {n + 1, 101};
+Line(102) = {101, 102};
+Line(103) = {102, 1};
+Curve Loop(1) = {1:n, 101, 102, 103};
+Plane Surface(1) = {1};
+For k In {1:piers}
+  Physical Curve(Sprintf("pier%g", k)) = {2*k - 1};
+EndFor
+Physical Curve("top") = {102};
+Physical Curve("left") = {103};
+Physical Surface("body") = {1};
+"#;
+
+/// Runs blocks from 1:6 to 6:1: a static one, one that breaks on ten piers, one that lifts off, and one with a load that
+/// comes and goes. Returns their folders.
+fn blocks(directory: &TestDirectory) -> [&'static str; 4] {
+    directory.write("piers.geo", PIERS);
+    let damage =
+        "[damage]\ndiffusion = 0.1\nlambda_d = 0.1\nlambda_u = 1e9\n[time]\nend = 1\nstep = 0.1\n";
+    let cases = [
+        ("tall", (1, 6, 1), "", "-4e5*x"),
+        ("broken", (12, 2, 10), damage, "-4e6*t*x"),
+        ("lifted", (5, 2, 1), damage, "1e5*(t - 0.5)"),
+        ("pulsing", (6, 1, 1), damage, "-4e5*sin(4*t)*x"),
+    ];
+    for (name, (width, height, piers), damage, load) in cases {
+        let supports: String =
+            (1..=piers).map(|k| format!("[[boundary]]\nname = \"pier{k}\"\ngap = 0\n")).collect();
+        let scene = format!(
+            "title = \"A block that is {name}\"\n[mesh]\nfile = \"piers.geo\"\n[mesh.parameters]\nwidth = {width}\n\
+             height = {height}\npiers = {piers}\n[material]\nyoung = 30e9\npoisson = 0.2\nplane = \"strain\"\n\
+             {damage}{supports}[[boundary]]\nname = \"left\"\nsymmetry = true\n\
+             [[boundary]]\nname = \"top\"\ntraction = [0, \"{load}\"]\n[[probe]]\nname = \"inside\"\npoint = [0.5, 0.5]\n"
+        );
+        directory.write(&format!("{name}.toml"), &scene);
+        assert_eq!(directory.say(&["run", &format!("{name}.toml")]).code, Some(0), "{name}");
+    }
+    ["out/tall", "out/broken", "out/lifted", "out/pulsing"]
+}
+
+/// What a program beside this file prints, which gets the `folders`.
+fn checked(directory: &TestDirectory, program: &str, folders: &[&str]) -> Option<String> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cli/");
+    python(directory, &format!("sys.argv[1:] = {folders:?}\nexec(open('{path}{program}').read())"))
+}
+
+#[test]
+fn texts_of_pictures_do_not_overlap_and_reports_agree_with_the_history() {
+    // Bodies of any shape. Every number of a report that is also in history.csv or summary.json is compared with it.
+    let directory = TestDirectory::new();
+    let folders = blocks(&directory);
+    let Some(wrong) = checked(&directory, "pictures.py", &folders) else { return };
+    assert_eq!(wrong, "");
+    assert_eq!(directory.say(&[&["report"], &folders[..]].concat()).code, Some(0));
+    let compared = checked(&directory, "reports.py", &folders).expect("as before");
+    let (count, _) = compared.split_once(" numbers").expect("a count alone");
+    assert!(count.parse::<usize>().is_ok_and(|count| count > 100), "{compared}");
+    // A run that ζ_* ended says so, and calls the state before by its name.
+    let page = directory.read("out/broken/report.html");
+    for text in ["<td>reached ζ_*</td>", "last state, before the stop", " ± "] {
+        assert!(page.contains(text), "no `{text}`");
+    }
+}
+
+#[test]
+fn one_picture_and_the_forces_of_several_runs_are_drawn_alone() {
+    let directory = TestDirectory::new();
+    directory.run(&["--out", "out/one"]);
+    directory.run(&["--out", "out/two", "--set", "material.young=160"]);
+    let words = ["figures", "out/one", "--only", "pressure"];
+    let Some(said) = directory.say_python(&words) else { return };
+    assert_eq!(said.out, "out/one/pressure.png\n");
+    let refused = directory.say(&["figures", "out/one", "--only", "pressur"]);
+    assert!(
+        refused.code == Some(2) && refused.err.contains("pressur is none of setting"),
+        "{refused:?}"
+    );
+    let said = directory.say(&["figures", "out/one", "out/two", "--together", "--format", "svg"]);
+    assert_eq!(said.out, "out/one/force-displacement-together.svg\n");
+}
+
+#[test]
+fn curves_along_an_open_boundary_run_with_increasing_x_or_y() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    let ends = "from signorini_results import load\n\
+         for name in ('bottom', 'top', 'left'):\n\
+         \x20   part, = load('out/scene').parts(name)\n\
+         \x20   print(name, part[0].tolist(), part[-1].tolist())";
+    let Some(said) = python(&directory, ends) else { return };
+    assert_eq!(
+        said,
+        "bottom [0.0, 0.0] [1.0, 0.0]\ntop [0.0, 1.0] [1.0, 1.0]\nleft [0.0, 0.0] [0.0, 1.0]\n"
+    );
+    directory.say(&["figures", "out/scene", "--along", "top", "--format", "svg"]);
+    let drawn = directory.read("out/scene/curves_along_top_von_mises.svg");
+    assert!(drawn.contains("top: (0, 1) → (1, 1)"), "no direction");
+}
+
+#[test]
+fn large_displacements_and_their_foundation_and_moving_loads_are_shown_where_they_are() {
+    // A plate comes down by a fifth of the height, and a load walks along the top.
+    let directory = TestDirectory::new();
+    let scene = directory
+        .read("scene.toml")
+        .replace("name = \"left\"\nsymmetry = true", "name = \"bottom\"\ndisplacement = [0, 0]");
+    let scene = scene
+        .replace("name = \"bottom\"\ngap = \"0\"", "name = \"top\"\ngap = \"0.01 - 0.2*t\"")
+        .replace(
+            "name = \"top\"\ntraction = [\"0\", \"-3*t\"]",
+            "name = \"right\"\ntraction = [\"if(abs(y - t) < 0.3, -1, 0)\", 0]",
+        );
+    directory.write("scene.toml", &scene);
+    directory.run(&["--set", "output.every=1", "--set", "damage.lambda_u=0"]);
+    let draws = "from limits import limits_of\n\
+         from maps import draw_state, draw_stress_and_damage\n\
+         from setting import draw_setting\n\
+         from matplotlib.quiver import Quiver\n\
+         results = read_results(Path('out/scene'))\n\
+         limits = limits_of([results])\n\
+         def plate(figure):\n\
+         \x20   return sorted({round(line.get_ydata().max(), 6) for line in figure.axes[0].lines if len(line.get_xdata()) == 5 and line.get_linewidth() == 1.8})\n\
+         print(results.factor, plate(draw_setting(results, limits)), plate(draw_stress_and_damage(results, limits)))\n\
+         for time in (0.2, 0.8):\n\
+         \x20   axes = draw_state(read_results(Path('out/scene'), time), limits).axes[0]\n\
+         \x20   print([len(of.X) for of in axes.collections if isinstance(of, Quiver)], [round(of.Y.mean(), 1) for of in axes.collections if isinstance(of, Quiver) and len(of.X)])";
+    let Some(said) = python(&directory, draws) else { return };
+    assert_eq!(said, "1.0 [1.01] [0.81]\n[10, 0] [0.2]\n[10, 0] [0.7]\n");
+}
+
 /// What a Python program prints that has the scripts; none where Python lacks what these import.
 #[track_caller]
 fn python(directory: &TestDirectory, program: &str) -> Option<String> {

@@ -1,0 +1,84 @@
+"""Compares every number of the tables of report.html with history.csv and summary.json; prints those that contradict,
+and the number of those compared. It shares no code with the scripts."""
+
+import csv
+import html
+import json
+import re
+import sys
+from pathlib import Path
+
+NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
+# A number with a bar and a power of ten, or a plain one, with or without a bar.
+VALUE = re.compile(rf"\(({NUMBER}) ± ({NUMBER})\)e(-?\d+)|({NUMBER})(?: ± ({NUMBER}))?")
+
+
+def values(text):
+    """The values in a text, each with half a unit of its last digit."""
+    found = []
+    for inner, of_inner, power, plain, of_plain in VALUE.findall(text):
+        value, bar, scale = float(inner or plain), of_inner or of_plain, 10.0 ** int(power or 0)
+        digits, _, exponent = (bar or plain).partition("e")
+        _, point, decimals = digits.partition(".")
+        zeros = 0 if point or not bar else len(digits) - len(digits.rstrip("0"))
+        unit = 0.5 * 10.0 ** (int(exponent or 0) - len(decimals) + zeros)
+        # Without a bar four digits are printed, or two if the mesh does not determine the figure.
+        least = 0.0 if bar else abs(value) * (0.05 if "singular" in text or "not resolved" in text else 5e-4)
+        found.append((scale * value, scale * max(unit, least)))
+    return found
+
+
+def compared(where, text, expected):
+    """Prints what contradicts; returns the number of comparisons."""
+    printed = values(text.partition(" at t =")[0])
+    if len(printed) != len(expected):
+        print(f"{where}: {text!r} for {expected}")
+    for (value, unit), exact in zip(printed, expected):
+        if abs(value - exact) > 1.001 * unit + 1e-300:
+            print(f"{where}: {text!r}, but {exact}")
+    return len(printed)
+
+
+def extreme(name, column):
+    numbers = [float(cell) for cell in column if cell not in ("", "NaN")]
+    least = name.rpartition(".")[2] in ("zeta_min", "zeta_mean", "zeta", "principal_min")
+    return min(numbers) if least else max(numbers) if name.endswith("_max") else max(numbers, key=abs)
+
+
+count = 0
+for folder in map(Path, sys.argv[1:]):
+    summary = json.loads((folder / "summary.json").read_text())
+    with open(folder / "history.csv", newline="") as file:
+        history = list(csv.DictReader(file))
+    figures = summary["figures"]
+    for name, of in figures.items():
+        if of["governing"] and (found := [row[name] for row in history if row.get(name)]):
+            exact = extreme(name, found)
+            if abs(of["governing"]["value"] - exact) > 1e-12 * abs(exact):
+                print(f"{folder} {name}: {of['governing']} is not the extreme {exact} of history.csv")
+    page = (folder / "report.html").read_text()
+    tables = [[[html.unescape(cell) for cell in re.findall(r"<t[dh].*?>(.*?)</t[dh]>", row)]
+               for row in re.findall(r"<tr>(.*?)</tr>", table)] for table in re.findall(r"<table>(.*?)</table>", page)]
+    labels = {of["label"]: name for name, of in figures.items() if "." not in name}
+    for head, *rows in tables:
+        name = ""
+        for label, *cells in rows:
+            if head[1:2] == ["over all steps"]:
+                of, row = figures[labels[label]], dict(zip(head[1:], cells))
+                last = next((cell for title, cell in row.items() if title.startswith("last state")), "")
+                if "reached" not in cells[0]:
+                    count += compared(f"{folder} {label}", cells[0], [of["governing"]["value"]])
+                count += compared(f"{folder} {label}, last", last, [of["value"]] if last else [])
+            elif head[:1] == [""] and len(head) > 1:
+                name = label if label.strip() != "extreme" else name
+                for title, cell in zip(head[1:], cells):
+                    title = re.sub(r" \([^()]*\)$", "", title)
+                    own = [of for key, of in figures.items() if key.rpartition(".")[0] == name and re.sub(
+                        rf" (of|at|in) {name}\b|, [xy]$", "", of["label"]) == title]
+                    if cell and "–" not in cell:
+                        expected = [of["value"] if label == name else of["governing"]["value"] for of in own]
+                        count += compared(f"{folder} {name} {title}", cell, expected)
+    if summary["stopped_by"]:
+        count += compared(f"{folder}, the end", re.search(r"at t = (.*?) s", re.search(
+            r'class="ending">(.*?)</p>', page)[1])[1], [summary["stopped_at"]])
+print(count, "numbers")
