@@ -1,7 +1,7 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
 use crate::{
-    fem::{Body, Fit, Terms, monomials},
+    fem::{Body, Fits, Terms},
     petsc::PetscError,
 };
 use nalgebra::{Matrix6, Matrix6x3, Vector3};
@@ -33,7 +33,7 @@ pub struct RecoveredStrains<'a> {
     strains: Vec<Vector3<f64>>,
     per_triangle: usize,
     /// Per material: the fits of the vertices.
-    pub(super) fits: Vec<Vec<Option<Fit>>>,
+    fits: Vec<Fits>,
 }
 
 impl<'a> RecoveredStrains<'a> {
@@ -75,8 +75,7 @@ impl<'a> RecoveredStrains<'a> {
         let at = |i: usize| body.mesh.nodes[triangle[i]];
         let recovered = |i: usize, [x, y]: [f64; 2]| {
             let [vx, vy] = at(i);
-            let fit = fits[triangle[i]].as_ref();
-            fit.map_or_else(Vector3::zeros, |fit| fit.tr_mul(&monomials([x - vx, y - vy])))
+            fits.value(triangle[i], [x - vx, y - vy])
         };
         let vertex = |i: usize| recovered(i, at(i)) - computed[i];
         let middle = |i: usize, j: usize| {

@@ -39,7 +39,7 @@ pub(crate) use location::ON_SIDE;
 pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;
 pub use partition::Partition;
-pub(crate) use patches::{Fit, Patches, monomials};
+pub(crate) use patches::{Fits, Patches};
 pub use rigid_motion::{RigidMotion, resultant};
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;

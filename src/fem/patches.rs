@@ -3,7 +3,7 @@
 use super::{Body, Cells, POINTS, Partition, for_elements, quadratic_values};
 use crate::{ROUNDING, petsc::PetscError};
 use nalgebra::{Matrix6x3, SMatrix, SVector, Vector3, Vector6};
-use std::ops::Range;
+use std::{iter, ops::Range};
 
 /// Triangles needed to fit a polynomial at a vertex. A vertex with fewer takes the mean of the fits of its
 /// neighbours.
@@ -13,7 +13,7 @@ use std::ops::Range;
 const TRIANGLES_TO_FIT: usize = 4;
 
 /// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
-pub(crate) type Fit = Matrix6x3<f64>;
+type Fit = Matrix6x3<f64>;
 
 /// The fits around each vertex as linear functions of the strains.
 ///
@@ -127,7 +127,7 @@ impl Patches {
         &self,
         strains: &[Vector3<f64>],
         vertices: Option<&Partition>,
-    ) -> Result<Vec<Vec<Option<Fit>>>, PetscError> {
+    ) -> Result<Vec<Fits>, PetscError> {
         self.around.iter().map(|around| self.fits_of_material(around, strains, vertices)).collect()
     }
 
@@ -136,53 +136,59 @@ impl Patches {
         around: &TrianglesAround,
         strains: &[Vector3<f64>],
         partition: Option<&Partition>,
-    ) -> Result<Vec<Option<Fit>>, PetscError> {
+    ) -> Result<Fits, PetscError> {
         let (points, coefficients) = (self.per_triangle, coefficients(self.per_triangle));
-        let own_fit = |vertex: usize| {
+        let set_own = |fits: &mut Fits, vertex: usize| {
             let places = around.places(vertex);
-            let factors =
-                around.factors[coefficients * points * places.start..].chunks(coefficients);
-            let own = around.triangles[places]
-                .iter()
-                .flat_map(|t| &strains[points * t..points * (t + 1)]);
-            let mut fit = Fit::zeros();
-            for (factors, strain) in factors.zip(own) {
-                for (k, &factor) in factors.iter().enumerate() {
-                    (0..3).for_each(|i| fit[(k, i)] += factor * strain[i]);
+            let factors = &around.factors[coefficients * points * places.start..];
+            let own = around.triangles[places].iter().flat_map(|t| points * t..points * (t + 1));
+            let [fit @ .., known] = fits.entries_mut(vertex) else { return };
+            for (factors, q) in factors.chunks_exact(coefficients).zip(own) {
+                for (coefficient, factor) in fit.chunks_exact_mut(3).zip(factors) {
+                    (0..3).for_each(|i| coefficient[i] += factor * strains[q][i]);
                 }
             }
-            fit
+            *known = 1.0;
         };
-        let own = (0..self.vertices.len()).map(|vertex| {
-            (vertex < self.owned && self.has_own_fit(around, vertex)).then(|| own_fit(vertex))
-        });
-        let mut fits = Vec::from_iter(own);
-        update(&mut fits, partition)?;
+        let width = 3 * coefficients + 1;
+        let mut fits = Fits { width, entries: vec![0.0; width * self.vertices.len()] };
+        let update = |fits: &mut Fits| match partition {
+            Some(partition) => partition.update(&mut fits.entries, width),
+            None => Ok(()),
+        };
+        for vertex in (0..self.owned).filter(|&vertex| self.has_own_fit(around, vertex)) {
+            set_own(&mut fits, vertex);
+        }
+        update(&mut fits)?;
         // The other vertices take the mean of their neighbours' fits. Corners, with one triangle, come second,
         // because their neighbours get fits in the first pass. Over more triangles a mean of means would extrapolate
         // too far.
         for most in [usize::MAX, 1] {
             let mean = |vertex: usize| {
                 let neighbours = around.of(vertex).iter().flat_map(|&t| self.triangles[t]);
-                let known = neighbours.filter_map(|other| Some((other, fits[other]?)));
+                let known = neighbours.filter_map(|other| Some((other, fits.get(other)?)));
                 let at = |vertex: usize| self.vertices[vertex];
                 let (count, sum) = known.fold((0.0, Fit::zeros()), |(n, sum), (other, fit)| {
                     (n + 1.0, sum + moved(&fit, at(other), at(vertex)))
                 });
                 (count > 0.0).then(|| (vertex, sum / count))
             };
-            let left = (0..self.owned).filter(|&vertex| fits[vertex].is_none());
+            let left = (0..self.owned).filter(|&vertex| !fits.is_known(vertex));
             let left = left.filter(|&vertex| around.of(vertex).len() <= most);
             for (vertex, fit) in Vec::from_iter(left.filter_map(mean)) {
-                fits[vertex] = Some(fit);
+                let fit = fit.transpose();
+                let known = fit.iter().take(width - 1).copied().chain([1.0]);
+                fits.entries_mut(vertex).iter_mut().zip(known).for_each(|(to, from)| *to = from);
             }
-            update(&mut fits, partition)?;
+            update(&mut fits)?;
         }
         // Other vertices, as in strips one triangle thick, take a fit of the strains' degree: one triangle suffices.
-        for (vertex, fit) in fits.iter_mut().enumerate().take(self.owned) {
-            fit.get_or_insert_with(|| own_fit(vertex));
+        for vertex in 0..self.owned {
+            if !fits.is_known(vertex) {
+                set_own(&mut fits, vertex);
+            }
         }
-        update(&mut fits, partition)?;
+        update(&mut fits)?;
         Ok(fits)
     }
 }
@@ -192,20 +198,40 @@ fn coefficients(per_triangle: usize) -> usize {
     if per_triangle > 1 { 6 } else { 3 }
 }
 
-/// Gives ghosts the fits of their owners. Collective.
-fn update(fits: &mut [Option<Fit>], vertices: Option<&Partition>) -> Result<(), PetscError> {
-    let Some(vertices) = vertices.filter(|of| !of.comm().is_serial()) else { return Ok(()) };
-    // A fit, then 1; zeros without a fit.
-    let mut entries = vec![[0.0; 19]; fits.len()];
-    for (entries, fit) in entries.iter_mut().zip(&*fits) {
-        let all = fit.iter().flat_map(|fit| fit.as_slice()).chain([&1.0]);
-        entries.iter_mut().zip(all.filter(|_| fit.is_some())).for_each(|(to, from)| *to = *from);
+/// The fits of all vertices to the strains of a material.
+pub(crate) struct Fits {
+    width: usize,
+    /// Per vertex: the coefficients in turn, each with three components; then 1 if the fit is known, else 0.
+    entries: Vec<f64>,
+}
+
+impl Fits {
+    fn entries_mut(&mut self, vertex: usize) -> &mut [f64] {
+        &mut self.entries[self.width * vertex..self.width * (vertex + 1)]
     }
-    vertices.update(entries.as_flattened_mut(), 19)?;
-    for (fit, entries) in fits.iter_mut().zip(entries) {
-        *fit = (entries[18] > 0.0).then(|| Fit::from_column_slice(&entries[..18]));
+
+    fn entries(&self, vertex: usize) -> &[f64] {
+        &self.entries[self.width * vertex..self.width * (vertex + 1)]
     }
-    Ok(())
+
+    fn is_known(&self, vertex: usize) -> bool {
+        self.entries(vertex)[self.width - 1] > 0.0
+    }
+
+    fn get(&self, vertex: usize) -> Option<Fit> {
+        let entries = &self.entries(vertex)[..self.width - 1];
+        let entries = entries.iter().copied().chain(iter::repeat(0.0));
+        self.is_known(vertex).then(|| Fit::from_row_iterator(entries.take(18)))
+    }
+
+    /// The fit of a vertex at a point with this offset from it, m.
+    pub(crate) fn value(&self, vertex: usize, offset: [f64; 2]) -> Vector3<f64> {
+        let monomials = monomials(offset);
+        let terms = self.entries(vertex).chunks_exact(3).zip(&monomials);
+        terms.fold(Vector3::zeros(), |sum, (of, monomial)| {
+            sum + Vector3::new(of[0], of[1], of[2]) * *monomial
+        })
+    }
 }
 
 /// The quadrature points, m, triangle by triangle.
@@ -256,7 +282,7 @@ fn fit<const N: usize>(
 }
 
 /// 1, x, y, x², xy, y².
-pub(crate) fn monomials([x, y]: [f64; 2]) -> Vector6<f64> {
+fn monomials([x, y]: [f64; 2]) -> Vector6<f64> {
     Vector6::new(1.0, x, y, x * x, x * y, y * y)
 }
 

@@ -3,7 +3,7 @@
 use super::{DiscreteProblem, State, Value, figures::greatest};
 use crate::{
     ROUNDING,
-    fem::{Elements, Fit, Partition, Patches, RigidMotion, monomials},
+    fem::{Elements, Partition, Patches, RigidMotion},
     model::{Material, von_mises},
     petsc::PetscError,
 };
@@ -106,24 +106,22 @@ impl NodalStress {
         vertices: Option<&Partition>,
     ) -> Result<Vec<[f64; 4]>, PetscError> {
         let fits = self.patches.fits(&strained.strains, vertices)?;
-        Ok(self.by_fits(&fits, &strained.zeta))
-    }
-
-    /// As [`Self::stresses`], with the fits of the strains and η_*(ζ) at the nodes.
-    pub(crate) fn by_fits(&self, fits: &[Vec<Option<Fit>>], zeta: &[f64]) -> Vec<[f64; 4]> {
         let stress = |point: &Point| {
             let [x, y] = point.at;
             let strain = |end: usize| {
                 let [vx, vy] = self.patches.vertices[end];
-                let fit = fits[point.material][end].as_ref();
-                fit.map_or_else(Vector3::zeros, |fit| fit.tr_mul(&monomials([x - vx, y - vy])))
+                fits[point.material].value(end, [x - vx, y - vy])
+            };
+            let [first, last] = point.ends;
+            let strain = match first == last {
+                true => strain(first),
+                false => 0.5 * (strain(first) + strain(last)),
             };
             let (material, stiffness) = &self.materials[point.material];
-            let strain = 0.5 * (strain(point.ends[0]) + strain(point.ends[1]));
-            let stress = stiffness * strain * zeta[point.node];
+            let stress = stiffness * strain * strained.zeta[point.node];
             [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
         };
-        self.points.iter().map(stress).collect()
+        Ok(self.points.iter().map(stress).collect())
     }
 }
 
