@@ -55,12 +55,13 @@ plt.rcParams.update({
 })
 
 # What the command line asks of pictures: their width, inches, or None for widths of their own; the size of letters,
-# points, or None for one that suits the width; the largest height of maps, inches; whether they have titles, and in these the name of the run; whether maps have contour lines; the column
-# of history.csv over which forces are drawn, and the smallest and the largest stress of the colours, Pa, or None to
-# choose.
-OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None, range=None)
+# points, or None for one that suits the width; the largest height of maps, inches; whether they have titles, and in
+# these the name of the run; whether maps have contour lines; the column of history.csv over which forces are drawn, and
+# the smallest and the largest stress of the colours, Pa, or None to choose.
+OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
+                          range=None)
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
-# top, bottom), in the size of letters.
+# top, bottom), in the size of letters. They fit numbers of six digits.
 LINE = 1.35
 AROUND_MAPS = 5.6, 1.8, 1.0, 3.6
 AROUND_PLOTS = 7.0, 1.8, 1.4, 3.8
@@ -324,9 +325,9 @@ def legend(axes, below, **style):
     if not below:
         axes.legend(loc="best", **style)
         return
-    size, left = _size_of(axes), AROUND_PLOTS[0] * em()
+    size, left = _size_of(axes), (0.6 - AROUND_MAPS[0]) * em()
     columns = legend_columns(axes.get_legend_handles_labels()[1], wide(NARROWEST))
-    axes.legend(loc="upper left", bbox_to_anchor=((0.6 * em() - left) / size[0], -3.8 * em() / size[1]), ncols=columns,
+    axes.legend(loc="upper left", bbox_to_anchor=(left / size[0], -3.8 * em() / size[1]), ncols=columns,
                 borderaxespad=0.0, borderpad=0.0, fontsize="small", labelspacing=0.3, handletextpad=0.8,
                 columnspacing=1.0, **{"handlelength": 1.6, **style})
 

@@ -4,10 +4,9 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation
 
-from bars import three_digits
 from drawing import (
-    BLUE, INK, OPTIONS, RED, Map, draw_body, draw_colourbar, draw_foundation, draw_maps, draw_outline, draw_stress, draw_values,
-    headline, least_zeta, mesh_of, power_of, stress_colours, times_power,
+    BLUE, INK, OPTIONS, RED, Map, draw_body, draw_colourbar, draw_foundation, draw_maps, draw_outline, draw_stress,
+    draw_values, headline, least_zeta, mesh_of, power_of, stress_colours, times_power,
 )
 from principal import principal_maps
 from setting import ARROW, draw_loads
