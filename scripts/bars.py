@@ -8,12 +8,6 @@ ROUNDING = 1e-15
 LEAST_BAR = 1e-6
 
 
-def short(number):
-    """Two digits, as `1.6e-2`."""
-    mantissa, exponent = f"{number:.1e}".split("e")
-    return f"{mantissa}e{int(exponent)}"
-
-
 def three_digits(number):
     """A figure without a bar: 1220, not 1.22e+03."""
     return f"{float(f'{number:.3g}'):g}"
@@ -21,17 +15,17 @@ def three_digits(number):
 
 def barred(value, bar):
     """`5.3570 ± 0.0005`: the bar rounded up to its first digit, or to its second where the first is 1 or 2, and the
-    value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many. None without a bar."""
+    value to the same; `(1.4016 ± 0.0003)e-7` where decimals would be many, as on the screen. None without a bar."""
     if bar is None or bar <= ROUNDING * abs(value):
         return None
     if bar > abs(value) > 0:
-        return f"{short(value)} ± {short(bar)}"
+        return f"{value:.2g} ± {bar:.2g}"
     bar = max(bar, LEAST_BAR * abs(value))
     value, bar = Decimal(repr(float(value))), Decimal(repr(float(bar)))
     first = bar.adjusted()
     last = first - (bar.scaleb(-first) < 3)
     power = max(value, bar, key=abs).adjusted()
-    power = 0 if -4 <= power <= 6 else power
+    power = 0 if -3 <= power <= 6 else power
     unit = Decimal(1).scaleb(last - power)
     # Adding 0 takes the sign from a zero.
     value = value.scaleb(-power).quantize(unit) + 0

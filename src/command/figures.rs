@@ -132,9 +132,11 @@ impl<'a> LastFigures<'a> {
     /// The figures of the body and of contact whose extreme in the run is larger than their last value: the label, the value
     /// and the time.
     pub(super) fn governing(&self) -> impl Iterator<Item = (&str, String, f64)> {
-        let is_asked = |of: &&LastFigure| match (&of.figure.of, of.figure.dimension) {
+        // A lone foundation has the pressure of the whole.
+        let several = self.all.iter().filter(|of| of.figure.is_pressure()).count() > 2;
+        let is_asked = move |of: &&LastFigure| match (&of.figure.of, of.figure.dimension) {
             (Of::Body | Of::Material(_), _) | (Of::Boundary(_), Dimension::Force) => true,
-            (Of::Boundary(_), _) => of.figure.is_pressure(),
+            (Of::Boundary(_), _) => of.figure.is_pressure() && several,
             (Of::Probe(_), _) => false,
         };
         self.all.iter().filter(is_asked).filter_map(|of| {
@@ -144,7 +146,8 @@ impl<'a> LastFigures<'a> {
                 true => [1.0 - of.value, 1.0 - governing.value],
                 false => [of.value.abs(), governing.value.abs()],
             };
-            let value = || format!("{} {}", plain(governing.value, 4), of.unit);
+            let value =
+                || format!("{} {}", plain(governing.value, 4), of.unit).trim_end().to_owned();
             (last < SMALLER * most).then(|| (of.label, value(), governing.time))
         })
     }

@@ -73,7 +73,8 @@ pub fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
     let growth = (mesh.error.max(mesh.damage_error.unwrap_or(0.0)) / accuracy).max(1.0);
     let unknowns = growth * mesh.unknowns as f64;
     let (seconds, megabytes) = (15.0 * growth * seconds, 50.0 + 0.011 * unknowns);
-    let text = format!("roughly {unknowns:.0e} unknowns, {seconds:.0e} s, {megabytes:.0} MB");
+    let [unknowns, seconds] = [unknowns, seconds].map(|number| plain(number, 1));
+    let text = format!("roughly {unknowns} unknowns, {seconds} s, {megabytes:.0} MB");
     let _ = writeln!(io::stderr(), "{}", row("expected", text));
 }
 

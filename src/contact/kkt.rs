@@ -104,7 +104,10 @@ impl Kkt {
 
 impl fmt::Display for Kkt {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let parts = self.named().map(|(name, value)| format!("{name} {value:.1e}"));
+        let parts = self.named().map(|(name, value)| match value {
+            0.0 => format!("{name} 0"),
+            _ => format!("{name} {value:.1e}"),
+        });
         f.write_str(&parts.join(", "))
     }
 }

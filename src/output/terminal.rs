@@ -17,23 +17,24 @@ pub fn say(text: &str) {
 /// The smallest error bar that is shown, over its figure.
 const SMALLEST_BAR: f64 = 1e-6;
 
-/// A figure with its error bar, if it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-2`. The bar is rounded up to
+/// A figure with its error bar, if it has one: `5.3570 ± 0.0004`, or `(1.8139 ± 0.0012)e-4`. The bar is rounded up to
 /// one digit, or to two if the first one is 1 or 2. The figure has at most seven digits. `scripts/bars.py` does the
 /// same.
 pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     let exponent = |number: f64| number.abs().log10().floor() as i32;
     let bar = bar.filter(|bar| *bar > 0.0 && bar.is_finite() && value.is_finite());
-    let Some(bar) = bar else { return format!("{value:.6e}") };
+    let Some(bar) = bar else { return plain(value, 7) };
     if bar > value.abs() && value != 0.0 {
-        return format!("{value:.1e} ± {bar:.1e}");
+        return format!("{} ± {}", plain(value, 2), plain(bar, 2));
     }
     let of_both = exponent(value.abs().max(bar));
     let bar = bar.max(SMALLEST_BAR * value.abs());
     let last = exponent(bar) - i32::from(bar / 10_f64.powi(exponent(bar)) < 3.0);
     let bar = (bar / 10_f64.powi(last) - 1e-9).ceil() * 10_f64.powi(last);
     match of_both {
-        -3..5 => {
-            let decimals = (-last).max(0) as usize;
+        -3..7 => {
+            let (decimals, tens) = ((-last).max(0) as usize, 10_f64.powi(last));
+            let value = if last > 0 { (value / tens).round() * tens } else { value };
             format!("{value:.decimals$} ± {bar:.decimals$}")
         }
         _ => {
