@@ -61,13 +61,14 @@ fn compared(key: &str) {
 fn penalty_duality_has_the_same_iterates_condensed_and_with_all_unknowns() {
     let directory = TestDirectory::new();
     let run = |gap: &str, accelerate: bool, iterations: usize, options: &[&str]| {
-        let boundary = "boundary=[{ name = \"left\", displacement = [0, 0] }, \
-            { name = \"bottom\", gap = 0 }, { name = \"top\", traction = [0, \"-3*t\"] }]";
-        let gap = format!("boundary.bottom.gap=\"{gap}\"");
+        let boundary = format!(
+            "boundary=[{{ name = \"left\", displacement = [0, 0] }}, \
+            {{ name = \"bottom\", gap = \"{gap}\" }}, {{ name = \"top\", traction = [0, \"-3*t\"] }}]"
+        );
         let method = format!(
             "contact.penalty_duality={{ accelerate = {accelerate}, iterations = {iterations} }}"
         );
-        let keys = sets(&["time.step=1", "contact.rescue=false", boundary, &gap, &method]);
+        let keys = sets(&["time.step=1", "contact.rescue=false", &boundary, &method]);
         let command = ["run", "scene.toml", "--solver", "penalty-duality", "--out", "out"];
         directory.say(&[&command[..], &keys, options].concat())
     };
