@@ -95,7 +95,7 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
     };
     let mut rows = Vec::new();
     for boundary in &scene.boundaries {
-        let edges = mesh.curves.get(&boundary.name).map_or(&[][..], |curve| &curve.edges);
+        let edges = mesh.edges_of(&boundary.name);
         free.retain(|edge| !edges.contains(edge));
         let conditions = conditions(boundary, edges, mesh, &times, &scene.units.length);
         rows.push(row(&boundary.name, edges, conditions));

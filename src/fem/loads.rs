@@ -5,18 +5,13 @@ use super::{
     edge::THREE_GAUSS,
     element::{POINTS, quadratic_measure, quadratic_values},
 };
-use crate::mesh::twice_area;
+use crate::mesh::{midpoint, twice_area};
 use nalgebra::Matrix3;
 use rustc_hash::FxHashMap as HashMap;
 
 /// The triangles that are integrated in parts, by their index in the undivided mesh. Per part: the
 /// barycentric coordinates of its corners.
 pub type TriangleParts = HashMap<usize, Vec<[[f64; 3]; 3]>>;
-
-/// The midpoint of the side from `p` to `q`: where [`add_body_force`] takes f_B for P1.
-pub fn midpoint(p: [f64; 2], q: [f64; 2]) -> [f64; 2] {
-    [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]
-}
 
 /// The corners of a straight triangle, then the midpoints of the sides 01, 12, 20, m.
 pub fn six_points([a, b, c]: [[f64; 2]; 3]) -> [[f64; 2]; 6] {

@@ -34,7 +34,7 @@ pub use damage_certificate::DamageCertificate;
 pub use edge::{Edge, GAUSS, gauss_points, normal_error, parabola};
 pub use elasticity::Elasticity;
 pub use element::{Element, POINTS, QuadraturePoint, quadratic_values};
-pub use loads::{TriangleParts, add_body_force, add_traction, midpoint, part_point, six_points};
+pub use loads::{TriangleParts, add_body_force, add_traction, part_point, six_points};
 pub(crate) use location::ON_SIDE;
 pub use location::{Location, PointValues};
 pub use nodal_bases::NodalBases;

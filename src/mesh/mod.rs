@@ -26,7 +26,7 @@ pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
 pub(crate) use lines::CHORDS;
 pub use lines::Lines;
 pub use msh::{parse, read};
-pub use quadratic::Kink;
+pub use quadratic::{Kink, midpoint};
 pub use refine::Refinement;
 pub(crate) use refine::TIES;
 
@@ -85,6 +85,11 @@ impl Mesh {
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         let length = dx.hypot(dy);
         ([dy / length, -dx / length], length)
+    }
+
+    /// The edges of the physical curve `name` on the boundary; none if the mesh has no such curve.
+    pub fn edges_of(&self, name: &str) -> &[[usize; 2]] {
+        self.curves.get(name).map_or(&[], |curve| &curve.edges)
     }
 
     /// A place as text; see [`place`].
@@ -220,4 +225,11 @@ pub fn twice_area(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 /// The distance of two points, m.
 pub fn distance([x, y]: [f64; 2], [v, w]: [f64; 2]) -> f64 {
     (v - x).hypot(w - y)
+}
+
+/// The longest side of a triangle, its ends in increasing order, and the opposite vertex.
+pub(crate) fn longest_side(nodes: &[[f64; 2]], [a, b, c]: [usize; 3]) -> ([usize; 2], usize) {
+    let length = |&([p, q], _): &([usize; 2], usize)| distance(nodes[p], nodes[q]);
+    let sides = [(sorted([a, b]), c), (sorted([b, c]), a), (sorted([c, a]), b)];
+    sides.into_iter().max_by(|s, t| length(s).total_cmp(&length(t))).unwrap_or(sides[0])
 }

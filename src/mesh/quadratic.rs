@@ -4,11 +4,8 @@
 //! offset d = m − (a+b)/2 vanishes if it is straight. A triangle with vertices p_i is the image
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
-use super::{Lines, Mesh, Side, sides, sorted};
-use std::{
-    collections::BTreeMap,
-    f64::consts::{FRAC_PI_2, FRAC_PI_6},
-};
+use super::{Lines, Mesh, sorted};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 
 /// Relative offset |d| / length below which an edge is straight.
 const STRAIGHT: f64 = 1e-9;
@@ -34,12 +31,12 @@ impl Mesh {
     /// The midpoint of an edge (if curved, of its parabola), m.
     pub fn midpoint(&self, [a, b]: [usize; 2]) -> [f64; 2] {
         let curved = self.curved.get(&sorted([a, b]));
-        curved.copied().unwrap_or_else(|| mean(self.nodes[a], self.nodes[b]))
+        curved.copied().unwrap_or_else(|| midpoint(self.nodes[a], self.nodes[b]))
     }
 
     /// Sets the offset d (m) of an edge's midpoint. The edge is straight if d is only rounding error.
     pub fn set_offset(&mut self, edge: [usize; 2], [dx, dy]: [f64; 2]) {
-        let [x, y] = mean(self.nodes[edge[0]], self.nodes[edge[1]]);
+        let [x, y] = midpoint(self.nodes[edge[0]], self.nodes[edge[1]]);
         self.set_midpoint(edge, [x + dx, y + dy]);
     }
 
@@ -79,47 +76,32 @@ impl Mesh {
     pub fn kinks(&self) -> Vec<Kink> {
         let surfaces = self.surfaces_of_triangles();
         let lines = Lines::new(self, |triangle| &surfaces[triangle]);
-        // By node and by the surfaces on the left and on the right: the edges by which the line arrives and leaves.
-        let (mut arriving, mut leaving) = (BTreeMap::new(), BTreeMap::new());
-        for both in sides(&self.triangles).chunk_by(|a, b| a.edge == b.edge) {
-            let of = |side: &Side| &surfaces[side.triangle];
-            let is_line = both.len() == 1 || of(&both[0]) != of(&both[1]);
-            if !is_line {
-                continue;
-            }
-            let is_curved = self.curved.contains_key(&both[0].edge);
-            for (side, other) in both.iter().zip([both.get(1), both.first()]) {
-                let [a, b] = side.directed();
-                let between = (of(side), other.map(of));
-                let (_, length) = self.edge_normal([a, b]);
-                leaving.insert((a, between), (b, length, is_curved));
-                arriving.insert((b, between), (a, length, is_curved));
-            }
-        }
-        let kink = |(place, (next, after, is_curved)): (&(usize, _), &(usize, f64, bool))| {
-            let (last, before, was_curved) = arriving.get(place)?;
-            let ends = [*last, *next];
-            let [[a, b], [x, y]] = ends.map(|end| self.direction(place.0, end));
+        let kink = |(&node, ends): (&usize, &Vec<usize>)| {
+            // Where several lines meet, none goes on.
+            let &[p, q] = &ends[..] else { return None };
+            let [[a, b], [x, y]] = [p, q].map(|end| self.direction(node, end));
             let turn = (b * x - a * y).atan2(-a * x - b * y).abs();
-            let angle = match (was_curved, is_curved) {
-                (true, true) => turn,
-                (false, false) => return None,
+            let is_curved = [p, q].map(|end| self.curved.contains_key(&sorted([node, end])));
+            let angle = match is_curved {
+                [true, true] => turn,
+                [false, false] => return None,
                 _ => 2.0 * (turn - FRAC_PI_2).abs(),
             };
-            let is_mirrored = was_curved != is_curved;
+            let is_mirrored = is_curved[0] != is_curved[1];
             let is_end = is_mirrored && angle > MIRRORED;
+            let [before, after] = [p, q].map(|end| self.edge_normal([node, end]).1);
             (!is_end).then(|| Kink {
-                node: place.0,
+                node,
                 angle,
-                length: before.min(*after),
+                length: before.min(after),
                 is_corner: match is_mirrored {
                     true => angle > FRAC_PI_6,
-                    false => !lines.is_smooth(place.0, ends),
+                    false => !lines.is_smooth(node, [p, q]),
                 },
                 is_mirrored,
             })
         };
-        leaving.iter().filter_map(kink).collect()
+        lines.ends.iter().filter_map(kink).collect()
     }
 
     /// Per triangle: the numbers of its surfaces.
@@ -173,12 +155,13 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-fn mean(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+/// The middle between two points, m.
+pub fn midpoint(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])]
 }
 
 /// d = m − (a+b)/2.
-fn offset(a: [f64; 2], b: [f64; 2], midpoint: [f64; 2]) -> [f64; 2] {
-    let [x, y] = mean(a, b);
-    [midpoint[0] - x, midpoint[1] - y]
+fn offset(a: [f64; 2], b: [f64; 2], m: [f64; 2]) -> [f64; 2] {
+    let [x, y] = midpoint(a, b);
+    [m[0] - x, m[1] - y]
 }

@@ -60,8 +60,7 @@ impl BoundaryConditions {
         // A smaller constant gap counts as zero: nodes of curves and differences like `0.3-0.1*3` are rounded.
         let rounding = ROUNDING * extent(points);
         for boundary in &scene.boundaries {
-            let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-            let edges = body.edges(&curve.edges);
+            let edges = body.edges(mesh.edges_of(&boundary.name));
             let follows_mesh = boundary.gap().is_none_or(|gap| gap.normal.is_none());
             let normal_error = if follows_mesh { normal_error(&edges, points, lines) } else { 0.0 };
             for at in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points, lines))) {

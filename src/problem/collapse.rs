@@ -65,7 +65,7 @@ impl DiscreteProblem {
         let (mut remains, mut all) = (0.0, 0.0);
         for boundary in &self.scene().boundaries {
             let Some(gap) = boundary.gap() else { continue };
-            for &edge in mesh.curves.get(&boundary.name).iter().flat_map(|curve| &curve.edges) {
+            for &edge in mesh.edges_of(&boundary.name) {
                 let [a, b] = edge.map(|node| motion.at(mesh.nodes[node]));
                 let (normal, length) = mesh.edge_normal(edge);
                 let [x, y] = gap.normal.unwrap_or(normal);

@@ -24,9 +24,8 @@ pub(crate) struct MeanDisplacement {
 impl Means {
     pub(super) fn new(scene: &Scene, body: &Body, lines: &Lines) -> Self {
         let of_boundary = |name: &String| {
-            let edges = body.mesh.curves.get(name).map(|curve| body.edges(&curve.edges));
             let mut lengths = BTreeMap::new();
-            for edge in edges.iter().flatten() {
+            for edge in body.edges(body.mesh.edges_of(name)) {
                 for (node, face) in edge.faces(&body.nodes.points, lines) {
                     *lengths.entry(node).or_insert(0.0) += face.length;
                 }

@@ -83,8 +83,7 @@ impl DiscreteProblem {
         let mesh = self.mesh();
         let least_gap = |boundary: &Boundary| {
             let Gap { distance, .. } = boundary.gap()?;
-            let edges = mesh.curves.get(&boundary.name).into_iter().flat_map(|curve| &curve.edges);
-            let gaps = edges.flatten().map(|&node| {
+            let gaps = mesh.edges_of(&boundary.name).iter().flatten().map(|&node| {
                 let [x, y] = mesh.nodes[node];
                 distance.eval(x, y, self.scene().start())
             });

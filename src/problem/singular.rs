@@ -250,8 +250,7 @@ impl DiscreteProblem {
     fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
         let mut supports = BTreeMap::new();
         for boundary in &self.scene().boundaries {
-            let curve = self.mesh().curves.get(&boundary.name);
-            for edge in curve.iter().flat_map(|curve| &curve.edges) {
+            for edge in self.mesh().edges_of(&boundary.name) {
                 for condition in &boundary.conditions {
                     let (new, rank) = ((condition, boundary), |of| conditions(Some(of), 0.0).0);
                     let known = supports.entry(*edge).or_insert(new);

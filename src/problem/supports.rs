@@ -49,7 +49,7 @@ impl Supports {
         }
         let contact = scene.boundaries.iter().filter_map(|boundary @ Boundary { name, .. }| {
             let number = supports.names.iter().position(|other| other == name)?;
-            let edges = body.edges(&body.mesh.curves.get(name)?.edges);
+            let edges = body.edges(body.mesh.edges_of(name));
             Some((number, &**name, boundary.gap()?, edges))
         });
         // There an interface ends at the boundary.
@@ -66,8 +66,7 @@ impl Supports {
         let shared: BTreeSet<usize> = shared.map(|(node, _)| *node).collect();
         let triangles = triangles_at(body, &shared);
         for (number, name) in supports.names.iter().enumerate() {
-            let curve = body.mesh.curves.get(name);
-            for edge in curve.iter().flat_map(|curve| body.edges(&curve.edges)) {
+            for edge in body.edges(body.mesh.edges_of(name)) {
                 let Some(&triangle) = triangles.get(&sorted(edge.ends)) else { continue };
                 for (node, face) in edge.faces(&body.nodes.points, lines) {
                     let at = coordinates(&body.mesh.triangles[triangle], &edge, node);

@@ -5,8 +5,8 @@ use super::loads::{
     DEVIATION, NOTED, SAMPLE_TIMES, centroid, edge_parts, triangle_parts, triangle_point,
 };
 use crate::{
-    fem::{GAUSS, POINTS, midpoint, parabola, part_point, six_points},
-    mesh::{Curve, Mesh, Order, sorted},
+    fem::{GAUSS, POINTS, parabola, part_point, six_points},
+    mesh::{Mesh, Order, longest_side, midpoint, sorted},
     scene::{Condition, Expression, Scene},
 };
 use std::collections::HashSet;
@@ -32,13 +32,12 @@ pub(crate) fn unresolved(
 ) -> HashSet<[usize; 2]> {
     let mut found = HashSet::new();
     for boundary in &scene.boundaries {
-        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+        let edges = mesh.edges_of(&boundary.name);
         let length = |edge: &[usize; 2]| mesh.edge_normal(*edge).1;
-        let shortest = SHORTEST * curve.edges.iter().map(length).sum::<f64>();
+        let shortest = SHORTEST * edges.iter().map(length).sum::<f64>();
         for u in displacements(&boundary.conditions) {
-            let missed = missed_displacements(scene, mesh, curve, u).0;
-            let edges = curve.edges.iter().zip(missed);
-            let lost = edges.filter(|(edge, missed)| {
+            let missed = missed_displacements(scene, mesh, edges, u).0;
+            let lost = edges.iter().zip(missed).filter(|(edge, missed)| {
                 *missed > accuracy * displacement && length(edge) > shortest
             });
             found.extend(lost.map(|(edge, _)| sorted(*edge)));
@@ -54,7 +53,7 @@ pub(crate) fn unresolved(
                 break;
             }
             rest -= square;
-            found.extend(longest_side(mesh, triangle));
+            found.insert(longest_side(&mesh.nodes, mesh.triangles[triangle]).0);
         }
     }
     found
@@ -64,11 +63,10 @@ pub(crate) fn unresolved(
 pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
     let mut notes = Vec::new();
     for boundary in &scene.boundaries {
-        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
+        let edges = mesh.edges_of(&boundary.name);
         for u in displacements(&boundary.conditions) {
-            let (missed, largest) = missed_displacements(scene, mesh, curve, u);
-            let worst =
-                missed.iter().copied().zip(&curve.edges).max_by(|(a, _), (b, _)| a.total_cmp(b));
+            let (missed, largest) = missed_displacements(scene, mesh, edges, u);
+            let worst = missed.into_iter().zip(edges).max_by(|(a, _), (b, _)| a.total_cmp(b));
             let Some((missed, edge)) = worst.filter(|worst| worst.0 > NOTED * largest) else {
                 continue;
             };
@@ -106,14 +104,14 @@ fn displacements(conditions: &[Condition]) -> impl Iterator<Item = &Expression> 
 fn missed_displacements(
     scene: &Scene,
     mesh: &Mesh,
-    curve: &Curve,
+    edges: &[[usize; 2]],
     u: &Expression,
 ) -> (Vec<f64>, f64) {
     let line = |edge: &[usize; 2]| {
         let [p, q] = edge.map(|node| mesh.nodes[node]);
         [p, if scene.order == Order::Linear { midpoint(p, q) } else { mesh.midpoint(*edge) }, q]
     };
-    let lines: Vec<_> = curve.edges.iter().map(line).collect();
+    let lines: Vec<_> = edges.iter().map(line).collect();
     let mut times = scene.sample_times(SAMPLE_TIMES);
     times.truncate(if u.depends_on_time() { usize::MAX } else { 1 });
     let (mut missed, mut largest) = (vec![0.0_f64; lines.len()], 0.0_f64);
@@ -174,11 +172,4 @@ fn missed_damage(scene: &Scene, mesh: &Mesh) -> Option<MissedDamage> {
         }
     }
     Some(found)
-}
-
-/// The longest side of a triangle, by its ends in increasing order.
-fn longest_side(mesh: &Mesh, triangle: usize) -> Option<[usize; 2]> {
-    let [a, b, c] = mesh.triangles[triangle];
-    let sides = [[a, b], [b, c], [c, a]].into_iter().map(sorted);
-    sides.max_by(|p, q| mesh.edge_normal(*p).1.total_cmp(&mesh.edge_normal(*q).1))
 }

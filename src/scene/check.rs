@@ -8,8 +8,8 @@ use super::error::SceneError;
 use super::expression::Expression;
 use super::{Damage, Probe, Scene, may_start_at, rounded};
 use crate::{
-    fem::{gauss_points, midpoint},
-    mesh::{Curve, Lines, Mesh},
+    fem::gauss_points,
+    mesh::{Curve, Lines, Mesh, midpoint},
     suggestion::suggestion,
 };
 
@@ -106,8 +106,7 @@ impl Scene {
         check("body.force", &self.body_force.each_ref().map(Some), &midpoints, finite);
         check("body.gravity", &self.gravity.each_ref().map(Some), &[[0.0; 2]], finite);
         for boundary in &self.boundaries {
-            let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-            let edges = || curve.edges.iter().copied().map(at);
+            let edges = || mesh.edges_of(&boundary.name).iter().copied().map(at);
             let nodes: Vec<_> = edges().flatten().collect();
             let gauss_points: Vec<_> = edges().flat_map(|[p, q]| gauss_points(p, q)).collect();
             for condition in &boundary.conditions {
@@ -171,17 +170,14 @@ impl Scene {
 
     /// The boundaries that share an edge and contradict each other there. The constraints check shared nodes.
     fn check_shared_edges(&self, mesh: &Mesh) -> Vec<Problem> {
-        let edges = |boundary: &Boundary| match mesh.curves.get(&boundary.name) {
-            Some(curve) => &curve.edges[..],
-            None => &[],
-        };
         let mut problems = Vec::new();
         for (n, boundary) in self.boundaries.iter().enumerate() {
             for other in &self.boundaries[..n] {
                 let both = contradiction(&boundary.conditions, &other.conditions);
                 let Some([has, others]) = both else { continue };
-                let taken: BTreeSet<_> = edges(other).iter().collect();
-                let shared = edges(boundary).iter().find(|edge| taken.contains(edge));
+                let taken: BTreeSet<_> = mesh.edges_of(&other.name).iter().collect();
+                let own = mesh.edges_of(&boundary.name);
+                let shared = own.iter().find(|edge| taken.contains(edge));
                 let Some(&[p, q]) = shared else { continue };
                 let [x, y] = midpoint(mesh.nodes[p], mesh.nodes[q]);
                 let problem = format!(

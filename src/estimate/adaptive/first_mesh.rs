@@ -15,8 +15,7 @@ pub fn kinks(scene: &Scene, mesh: &Mesh, accuracy: f64) -> Vec<(f64, Kink)> {
     const IN_CONTACT: f64 = 0.03;
     let nodes_where = |is_so: &dyn Fn(&Boundary) -> bool| -> HashSet<usize> {
         let named = scene.boundaries.iter().filter(|boundary| is_so(boundary));
-        let curves = named.filter_map(|boundary| mesh.curves.get(&boundary.name));
-        curves.flat_map(|curve| curve.edges.concat()).collect()
+        named.flat_map(|boundary| mesh.edges_of(&boundary.name)).flatten().copied().collect()
     };
     let touching = nodes_where(&|boundary| boundary.gap().is_some());
     let mirror = nodes_where(&|boundary| {

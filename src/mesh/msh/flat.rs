@@ -1,6 +1,6 @@
 //! Triangles without area.
 
-use crate::mesh::{Side, distance, sides, sorted, twice_area};
+use crate::mesh::{Side, distance, longest_side, sides, sorted, twice_area};
 use std::collections::BTreeMap;
 
 /// Twice the area over the square of the longest side: below this value a triangle is flat.
@@ -65,11 +65,4 @@ pub fn mend(
         }
     }
     Ok(removed)
-}
-
-/// The longest side of a triangle, its ends in increasing order, and the opposite vertex.
-fn longest_side(nodes: &[[f64; 2]], [a, b, c]: [usize; 3]) -> ([usize; 2], usize) {
-    let length = |&([p, q], _): &([usize; 2], usize)| distance(nodes[p], nodes[q]);
-    let sides = [(sorted([a, b]), c), (sorted([b, c]), a), (sorted([c, a]), b)];
-    sides.into_iter().max_by(|s, t| length(s).total_cmp(&length(t))).unwrap_or(sides[0])
 }

@@ -1,7 +1,7 @@
 //! Checks that the triangles make one body.
 
 use super::byte_reader::{Result, error_at};
-use crate::mesh::{Side, extent, place, twice_area};
+use crate::mesh::{Side, extent, place};
 
 /// Checks that the triangles are one body: connected through their `sides`.
 pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Result<()> {
@@ -19,10 +19,11 @@ pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Re
     let piece = components(triangles.len(), meeting.iter().map(|(_, pair)| *pair));
     let pieces: Vec<usize> = (0..triangles.len()).filter(|&t| piece[t] == t).collect();
     let place = |at: [f64; 2]| place(extent(nodes), at);
-    let around = |own: usize| place(centroid(nodes, triangles, |t| piece[t] == own));
+    let middle =
+        |t: usize| [0, 1].map(|k| triangles[t].map(|node| nodes[node][k] / 3.0).iter().sum());
     let problem = if let [a, b, more @ ..] = &pieces[..] {
         let (count, two) = (pieces.len(), if more.is_empty() { "" } else { " two of them" });
-        let [a, b] = [a, b].map(|own| around(*own));
+        let [a, b] = [a, b].map(|t| place(middle(*t)));
         format!("the mesh has {count} pieces,{two} around {a} and {b}; join them (gmsh: Coherence)")
     } else {
         let hinge = meeting.iter().find(|(_, [a, b])| part[*a] != part[*b]);
@@ -49,20 +50,4 @@ fn components(count: usize, links: impl IntoIterator<Item = [usize; 2]>) -> Vec<
     // Parents come before their children.
     (0..count).for_each(|i| parent[i] = parent[parent[i]]);
     parent
-}
-
-/// The centroid of the `counted` triangles, m.
-fn centroid(
-    nodes: &[[f64; 2]],
-    triangles: &[[usize; 3]],
-    counted: impl Fn(usize) -> bool,
-) -> [f64; 2] {
-    let mut sums = [0.0; 3];
-    for (_, corners) in triangles.iter().enumerate().filter(|(t, _)| counted(*t)) {
-        let [a, b, c] = corners.map(|node| nodes[node]);
-        let area = twice_area(a, b, c);
-        let [x, y] = [0, 1].map(|k| area * (a[k] + b[k] + c[k]) / 3.0);
-        sums = [sums[0] + area, sums[1] + x, sums[2] + y];
-    }
-    [sums[1] / sums[0], sums[2] / sums[0]]
 }

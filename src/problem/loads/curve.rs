@@ -33,9 +33,9 @@ fn breaks(problem: &DiscreteProblem, end: f64) -> Vec<f64> {
     let boxes: Vec<_> = triangles.map(|t| bounds(t.iter().flatten().map(at))).collect();
     scene.body_force.iter().chain(&scene.gravity).for_each(|f| add(f, &boxes));
     for boundary in &scene.boundaries {
-        let Some(curve) = mesh.curves.get(&boundary.name) else { continue };
-        let edges = curve.edges.chunks(curve.edges.len().div_ceil(BOXES).max(1));
-        let boxes: Vec<_> = edges.map(|edges| bounds(edges.iter().flatten().map(at))).collect();
+        let edges = mesh.edges_of(&boundary.name);
+        let parts = edges.chunks(edges.len().div_ceil(BOXES).max(1));
+        let boxes: Vec<_> = parts.map(|edges| bounds(edges.iter().flatten().map(at))).collect();
         let of_conditions = boundary.conditions.iter().flat_map(Condition::expressions);
         of_conditions.flatten().for_each(|f| add(f, &boxes));
     }

@@ -59,7 +59,7 @@ pub(in crate::problem) fn load_jumps(
     // Per edge its loads; `None` if it is supported.
     let mut edges = BTreeMap::<[usize; 2], Option<Vec<&SurfaceLoad>>>::new();
     for boundary in &scene.boundaries {
-        for edge in mesh.curves.get(&boundary.name).iter().flat_map(|curve| &curve.edges) {
+        for edge in mesh.edges_of(&boundary.name) {
             let known = edges.entry(sorted(*edge)).or_insert_with(|| Some(Vec::new()));
             *known = known.take().filter(|_| !boundary.is_support());
             known.iter_mut().for_each(|of| of.extend(boundary.loads()));
