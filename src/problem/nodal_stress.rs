@@ -3,7 +3,7 @@
 use super::{DiscreteProblem, State, Value, figures::greatest};
 use crate::{
     ROUNDING,
-    fem::{Elements, Partition, Patches, RigidMotion},
+    fem::{Partition, Patches, RigidMotion},
     model::{Material, von_mises},
     petsc::PetscError,
 };
@@ -51,10 +51,7 @@ impl NodalStress {
         let mut points: Vec<Point> = body.nodes.points.iter().map(unset).collect();
         let mut copies = HashMap::default();
         let mut cells = Vec::new();
-        let nodes_of = |t: usize| match body.elements() {
-            Elements::Linear(cells) => cells.nodes[t].to_vec(),
-            Elements::Quadratic(cells) => cells.nodes[t].to_vec(),
-        };
+        let nodes_of = |t: usize| for_elements!(body, cells => cells.nodes[t].to_vec());
         for (t, vertices) in body.mesh.triangles.iter().enumerate() {
             let material = body.material(t);
             for (i, node) in nodes_of(t).into_iter().enumerate() {

@@ -6,8 +6,8 @@
 
 use super::{DiscreteProblem, NOTED, State, rows_of};
 use crate::{
-    fem::{Edge, Elements, parabola},
-    mesh::sorted,
+    fem::{Edge, parabola},
+    mesh::{bounds, sorted},
     scene::Gap,
 };
 use std::collections::HashMap;
@@ -36,11 +36,9 @@ impl DiscreteProblem {
         let mut own = Vec::new();
         let displacement = self.body.nodes.partition.max_norm(&state.u);
         let boundaries = self.scene().boundaries.iter().enumerate();
-        for (number, gap, curve) in boundaries.filter_map(|(number, boundary)| {
-            Some((number, boundary.gap()?, self.body.mesh.curves.get(&boundary.name)?))
-        }) {
-            let sides = self.sides(&curve.edges);
-            for (triangle, edge) in sides {
+        for (number, boundary) in boundaries {
+            let Some(gap) = boundary.gap() else { continue };
+            for (triangle, edge) in self.sides(self.body.mesh.edges_of(&boundary.name)) {
                 let (depth, [x, y]) = self.deepest(gap, &edge, state, displacement);
                 if depth > 0.0 {
                     own.push([triangle as f64, depth, x, y, number as f64]);
@@ -59,24 +57,15 @@ impl DiscreteProblem {
 
     /// The triangle of each of these edges in the undivided mesh, and the nodes of u on the edge.
     fn sides(&self, edges: &[[usize; 2]]) -> Vec<(usize, Edge)> {
-        let body = &self.body;
+        let (body, node) = (&self.body, self.body.node_of_vertex());
         let wanted: HashMap<[usize; 2], [usize; 2]> =
             edges.iter().map(|&edge| (sorted(edge), edge)).collect();
         let mut sides = Vec::new();
         for (t, &[a, b, c]) in body.mesh.triangles.iter().enumerate() {
             for (i, side) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
                 if let Some(&directed) = wanted.get(&sorted(side)) {
-                    let edge = match body.elements() {
-                        Elements::Linear(_) => Edge { ends: directed, middle: None },
-                        Elements::Quadratic(cells) => {
-                            let nodes = cells.nodes[t];
-                            let at = |vertex: usize| {
-                                let corner = [a, b, c].iter().position(|&v| v == vertex);
-                                nodes[corner.unwrap_or(0)]
-                            };
-                            Edge { ends: directed.map(at), middle: Some(nodes[3 + i]) }
-                        }
-                    };
+                    let middle = body.quadratic_nodes().map(|nodes| nodes[t][3 + i]);
+                    let edge = Edge { ends: directed.map(|vertex| node[vertex]), middle };
                     sides.push((body.global_triangles[t], edge));
                 }
             }
@@ -120,7 +109,7 @@ impl DiscreteProblem {
             let along = [from, half, to];
             let [a, m, b] = along.map(normal_displacement);
             let max = a.max(m).max(b) + 0.25 * (a - 2.0 * m + b).abs();
-            let [x, y] = bounds(along.map(|s| edge.at(points, s)));
+            let [x, y] = bounds(&along.map(|s| edge.at(points, s)));
             let [min, _] = gap.distance.range([x, y, [t; 2]]);
             let hidden = max - min - deepest.0 > RESOLVED * displacement;
             if hidden && to - from > NARROWEST {
@@ -158,12 +147,4 @@ impl DiscreteProblem {
             )
         })
     }
-}
-
-/// The box around points, [x from, x to] and [y from, y to], m.
-fn bounds(points: [[f64; 2]; 3]) -> [[f64; 2]; 2] {
-    [0, 1].map(|k| {
-        let [a, b, c] = points.map(|point| point[k]);
-        [a.min(b).min(c), a.max(b).max(c)]
-    })
 }
