@@ -144,11 +144,6 @@ pub struct SceneArguments {
 /// Keys without effect if an accuracy is required.
 const CHOSEN: [&str; 3] = ["mesh.size", "time.step", "time.tolerance"];
 
-/// The key of a `--set` argument.
-fn key_of(set: &str) -> &str {
-    set.split('=').next().unwrap_or_default().trim()
-}
-
 impl SceneArguments {
     /// Checks that no argument is without effect.
     fn check(&self) -> Result<(), Failure> {
@@ -186,7 +181,8 @@ impl SceneArguments {
                 "{key} has no effect without accuracy; add accuracy = 0.01, say, or --accuracy 0.01"
             )));
         }
-        let is_chosen = |set: &&String| CHOSEN.contains(&key_of(set));
+        let is_chosen =
+            |set: &&String| set.split('=').next().is_some_and(|key| CHOSEN.contains(&key.trim()));
         let unused = self.set.iter().filter(|_| scene.accuracy.is_some()).find(is_chosen);
         let mut notes = Vec::from_iter(unused.map(|set| {
             format!("--set {set} has no effect: the accuracy chooses the mesh and the time steps")

@@ -13,9 +13,6 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Agreement of the ranks (as by Open MPI's MPIX_Comm_agree): all ranks go on with their values, or all fail.
 /// The first rank with an error reports it, and all ranks end with its exit code. Collective.
 pub fn agree<T>(comm: Communicator, result: Result<T, Failure>) -> Result<T, Failure> {
-    if comm.is_serial() {
-        return result;
-    }
     let failed = comm.any(result.is_err());
     let failure = match result {
         Ok(value) if !failed => return Ok(value),

@@ -240,7 +240,10 @@ fn solve(
             (Ok(outcome), Some(ratio)) if !task.repeats => {
                 drop(recorder);
                 confirm_stop(session, &mut task, &outcome)?;
-                task.shorten_steps(ratio);
+                if let Some(adapted) = &mut task.adapted {
+                    adapted.steps *= ratio;
+                    task.problem.set_step_tolerance(adapted.steps);
+                }
                 task.repeats = true;
                 show_again(session.comm());
             }

@@ -40,13 +40,3 @@ pub struct Task<'a> {
     pub phases: &'a Phases,
     pub started: Instant,
 }
-
-impl Task<'_> {
-    /// Multiplies the tolerance of the time steps by `ratio`.
-    pub fn shorten_steps(&mut self, ratio: f64) {
-        if let Some(adapted) = &mut self.adapted {
-            adapted.steps *= ratio;
-            self.problem.set_step_tolerance(adapted.steps);
-        }
-    }
-}

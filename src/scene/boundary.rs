@@ -42,10 +42,7 @@ impl Condition {
     /// Does it support the body, with a force that is an unknown? It then has its values at nodes, and a load at the
     /// points that integrate it.
     pub fn is_support(&self) -> bool {
-        match self {
-            Self::Displacement(_) | Self::Symmetry | Self::Gap(_) => true,
-            Self::Load(_) => false,
-        }
+        !matches!(self, Self::Load(_))
     }
 
     /// The expressions of its components; `None` for a free component.

@@ -2,7 +2,6 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    contact::ContactPoint,
     evolution::{DiscreteProblem, Outcome, State},
     fem::Stiffness,
     linear::{LinearSolver, LinearSystem},
@@ -131,20 +130,14 @@ impl FixedContact<'_> {
         let internal = problem.terms.internal_force(&problem.body, &zeta, &state.u);
         let mut residual = problem.motions.balanced(&problem.body, problem.load(state.time));
         residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-        self.set(&state.zeta, &state.contact);
+        let DiscreteProblem { body, constraints, .. } = problem;
+        let flags = active_bounds(constraints, &state.contact, 0.0);
+        let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
+        self.active = active.map(|(bound, _)| bound.dof).collect();
+        self.stiffness.set_damage(body, &zeta);
         let correction = self.displacement(residual)?;
         let max_norm = |u: Vec<f64>| problem.body.nodes.partition.max_norm(&u) / max;
         Ok(correction.map_or(f64::INFINITY, max_norm))
-    }
-
-    /// Sets the nodal damage and the active nodes of a state. Collective.
-    fn set(&mut self, zeta: &[f64], contact: &[ContactPoint]) {
-        let DiscreteProblem { body, constraints, .. } = self.problem;
-        let flags = active_bounds(constraints, contact, 0.0);
-        let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
-        self.active = active.map(|(bound, _)| bound.dof).collect();
-        let zeta = self.problem.zeta_at_points(zeta);
-        self.stiffness.set_damage(body, &zeta);
     }
 
     /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or
@@ -159,19 +152,14 @@ impl FixedContact<'_> {
         answer.write(|u| u.fill(0.0))?;
         let norm = rhs.norm()?;
         // With an old factor, the error may have one digit less than the residual.
-        let system = system(problem, stiffness, active);
+        let prescribed = problem.body.nodes.partition.comm().any(!active.is_empty());
+        let system = LinearSystem {
+            prescribed: prescribed.then_some(&active[..]),
+            scale: stiffness.scale,
+            ..LinearSystem::of(&stiffness.matrix)
+        };
         let solved = solver.solve_renewing(system, rhs, answer, 0.01 * norm)?;
         *gave_up = solved.gave_up;
         solved.converged.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
     }
-}
-
-/// K with the unknowns `active` fixed. Collective.
-fn system<'a>(
-    problem: &DiscreteProblem,
-    stiffness: &'a Stiffness,
-    active: &'a [usize],
-) -> LinearSystem<'a> {
-    let prescribed = problem.body.nodes.partition.comm().any(!active.is_empty()).then_some(active);
-    LinearSystem { prescribed, scale: stiffness.scale, ..LinearSystem::of(&stiffness.matrix) }
 }

@@ -32,8 +32,6 @@ pub(in crate::problem) struct SurfaceForce {
     smooth: Vec<[[f64; 2]; 3]>,
     /// The same edges on this rank; `None` for edges of other ranks.
     edges: Vec<Option<Edge>>,
-    /// The samples of a load that does not depend on time.
-    constant: Option<Vec<f64>>,
 }
 
 impl SurfaceForce {
@@ -46,13 +44,7 @@ impl SurfaceForce {
         let lines = edges.iter().map(line).collect();
         let smooth = smooth_halves(edges, points);
         let (force, edges) = (force.clone(), edges.iter().copied().map(Some).collect());
-        let mut new = Self { force, lines, smooth, edges, constant: None };
-        if !new.expressions().any(Expression::depends_on_time) {
-            let mut samples = Vec::new();
-            new.sample(0.0, &mut samples);
-            new.constant = Some(samples);
-        }
-        new
+        Self { force, lines, smooth, edges }
     }
 
     pub(super) fn restrict(self, subdomain: &Subdomain) -> Self {
@@ -102,10 +94,6 @@ impl SurfaceForce {
 
     /// The forces on all edges at time t, by expression.
     pub(super) fn sample(&self, t: f64, forces: &mut Vec<f64>) {
-        if let Some(constant) = &self.constant {
-            forces.extend(constant);
-            return;
-        }
         let (first, expressions) = (forces.len(), self.force.expressions());
         forces.resize(first + expressions.len() * self.lines.len(), 0.0);
         for (edge, [from, to]) in self.parts(t, SAMPLED).parts {
