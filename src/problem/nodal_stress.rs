@@ -3,7 +3,7 @@
 use super::{DiscreteProblem, State, Value, figures::greatest};
 use crate::{
     ROUNDING,
-    fem::{Partition, Patches, RigidMotion},
+    fem::{Partition, Patches, RigidMotion, for_elements},
     model::{Material, von_mises},
     petsc::PetscError,
 };
