@@ -8,7 +8,7 @@
 //! counter-clockwise order, or a [`MeshError`] names the file and the line.
 
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 mod boundary;
 mod error;
@@ -90,6 +90,16 @@ impl Mesh {
     /// The edges of the physical curve `name` on the boundary; none if the mesh has no such curve.
     pub fn edges_of(&self, name: &str) -> &[[usize; 2]] {
         self.curves.get(name).map_or(&[], |curve| &curve.edges)
+    }
+
+    /// The triangle at each of these boundary edges, and the number of its side there, by the ends in increasing order.
+    pub fn triangles_at(&self, edges: &[[usize; 2]]) -> HashMap<[usize; 2], (usize, usize)> {
+        let wanted: HashSet<_> = edges.iter().map(|edge| sorted(*edge)).collect();
+        let sides = |(t, &[a, b, c]): (usize, &[usize; 3])| {
+            [([a, b], 0), ([b, c], 1), ([c, a], 2)].map(|(side, i)| (sorted(side), (t, i)))
+        };
+        let sides = self.triangles.iter().enumerate().flat_map(sides);
+        sides.filter(|(side, _)| wanted.contains(side)).collect()
     }
 
     /// A place as text; see [`place`].

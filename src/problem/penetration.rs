@@ -10,7 +10,6 @@ use crate::{
     mesh::{bounds, sorted},
     scene::Gap,
 };
-use std::collections::HashMap;
 
 /// The error of penetrations, as a fraction of the maximum displacement …
 const RESOLVED: f64 = 1e-3;
@@ -33,14 +32,20 @@ pub(crate) struct Penetration {
 impl DiscreteProblem {
     /// The penetrations of the foundation between the nodes of Γ_C, in a state. Collective.
     pub(crate) fn penetrations(&self, state: &State) -> Vec<Penetration> {
-        let mut own = Vec::new();
+        let (body, node, mut own) = (&self.body, self.body.node_of_vertex(), Vec::new());
         let displacement = self.body.nodes.partition.max_norm(&state.u);
         let boundaries = self.scene().boundaries.iter().enumerate();
         for (number, boundary) in boundaries {
             let Some(gap) = boundary.gap() else { continue };
-            for (triangle, edge) in self.sides(self.body.mesh.edges_of(&boundary.name)) {
+            let edges = body.mesh.edges_of(&boundary.name);
+            let triangles = body.mesh.triangles_at(edges);
+            for edge in edges {
+                let (t, side) = triangles[&sorted(*edge)];
+                let middle = body.quadratic_nodes().map(|nodes| nodes[t][3 + side]);
+                let edge = Edge { ends: edge.map(|vertex| node[vertex]), middle };
                 let (depth, [x, y]) = self.deepest(gap, &edge, state, displacement);
                 if depth > 0.0 {
+                    let triangle = body.global_triangles[t];
                     own.push([triangle as f64, depth, x, y, number as f64]);
                 }
             }
@@ -53,24 +58,6 @@ impl DiscreteProblem {
             boundary: boundary as usize,
         };
         all.as_chunks().0.iter().map(penetration).collect()
-    }
-
-    /// The triangle of each of these edges in the undivided mesh, and the nodes of u on the edge.
-    fn sides(&self, edges: &[[usize; 2]]) -> Vec<(usize, Edge)> {
-        let (body, node) = (&self.body, self.body.node_of_vertex());
-        let wanted: HashMap<[usize; 2], [usize; 2]> =
-            edges.iter().map(|&edge| (sorted(edge), edge)).collect();
-        let mut sides = Vec::new();
-        for (t, &[a, b, c]) in body.mesh.triangles.iter().enumerate() {
-            for (i, side) in [[a, b], [b, c], [c, a]].into_iter().enumerate() {
-                if let Some(&directed) = wanted.get(&sorted(side)) {
-                    let middle = body.quadratic_nodes().map(|nodes| nodes[t][3 + i]);
-                    let edge = Edge { ends: directed.map(|vertex| node[vertex]), middle };
-                    sides.push((body.global_triangles[t], edge));
-                }
-            }
-        }
-        sides
     }
 
     /// The maximum penetration between the nodes of an edge and its place, m, to [`RESOLVED`] of the

@@ -64,10 +64,13 @@ impl Supports {
         let several = |of: &[(usize, [f64; 2])]| of.iter().any(|(number, _)| *number != of[0].0);
         let shared = supports.prescribed.iter().filter(|(_, of)| several(of));
         let shared: BTreeSet<usize> = shared.map(|(node, _)| *node).collect();
-        let triangles = triangles_at(body, &shared);
+        let is_shared = |edge: &&[usize; 2]| edge.iter().any(|node| shared.contains(node));
         for (number, name) in supports.names.iter().enumerate() {
-            for edge in body.edges(body.mesh.edges_of(name)) {
-                let Some(&triangle) = triangles.get(&sorted(edge.ends)) else { continue };
+            let edges = body.mesh.edges_of(name).iter().filter(is_shared).copied();
+            let edges = Vec::from_iter(edges);
+            let triangles = body.mesh.triangles_at(&edges);
+            for edge in body.edges(&edges) {
+                let (triangle, _) = triangles[&sorted(edge.ends)];
                 for (node, face) in edge.faces(&body.nodes.points, lines) {
                     let at = coordinates(&body.mesh.triangles[triangle], &edge, node);
                     let of_node = NodeEdge { boundary: number, triangle, at, face };
@@ -191,15 +194,6 @@ fn projection(directions: impl Iterator<Item = Vector2<f64>> + Clone) -> Matrix2
     let first = directions.clone().next().unwrap_or_default();
     let is_plane = directions.map(|other| first.perp(&other).abs()).any(|sine| sine > SINE);
     if is_plane { Matrix2::identity() } else { first * first.transpose() }
-}
-
-/// The triangle at each edge with an end in `nodes`, by the sorted ends of the edge.
-fn triangles_at(body: &Body, nodes: &BTreeSet<usize>) -> BTreeMap<[usize; 2], usize> {
-    let sides = |(triangle, [a, b, c]): (usize, &[usize; 3])| {
-        [[*a, *b], [*b, *c], [*c, *a]].map(|side| (sorted(side), triangle))
-    };
-    let sides = body.mesh.triangles.iter().enumerate().flat_map(sides);
-    sides.filter(|(side, _)| side.iter().any(|node| nodes.contains(node))).collect()
 }
 
 /// The barycentric coordinates of a node of an edge in a triangle.
