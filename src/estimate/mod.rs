@@ -70,10 +70,9 @@ pub fn run_from(
 
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {
-    let Run { mut damage_step, contact_step, mut controller, mut outcome } = run;
-    let mut fixed_contact = contact_step.into_fixed_contact()?;
+    let Run { mut damage_step, mut contact_step, mut controller, mut outcome } = run;
     let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.accuracy = phases.time("accuracy", || fixed_contact.accuracy(&outcome))?;
+    outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
     outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
     outcome.penetration = phases.time("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])

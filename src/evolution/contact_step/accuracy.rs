@@ -3,9 +3,8 @@
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
     evolution::{DiscreteProblem, Outcome, State},
-    fem::Stiffness,
-    linear::{LinearSolver, LinearSystem},
-    petsc::{PetscError, Vector},
+    linear::LinearSystem,
+    petsc::PetscError,
 };
 
 /// The promised relative error of displacements is the larger of this and `TOLERANCES` times the KKT tolerance.
@@ -72,94 +71,63 @@ impl Accuracy {
     }
 }
 
-/// Displacements caused by small forces at a state of a run, with the active nodes fixed.
-pub(crate) struct FixedContact<'a> {
-    problem: &'a DiscreteProblem,
-    stiffness: Stiffness,
-    /// The fixed unknowns.
-    active: Vec<usize>,
-    solver: LinearSolver,
-    gave_up: Option<&'static str>,
-    rhs: Vector,
-    answer: Vector,
-}
-
-impl<'a> ContactStep<'a> {
-    /// The solver with the contact of a state kept fixed, with the factor of the last solve.
-    pub(crate) fn into_fixed_contact(self) -> Result<FixedContact<'a>, PetscError> {
-        let Self { problem, stiffness, elastic: mut solver, load, c, .. } = self;
-        let bounded = problem.constraints.bounds.iter().map(|bound| bound.dof);
-        solver.factor().set_condensed(&stiffness.matrix, bounded)?;
-        let (active, gave_up, rhs, answer) = (Vec::new(), None, load, c);
-        Ok(FixedContact { problem, stiffness, active, solver, gave_up, rhs, answer })
-    }
-}
-
-impl FixedContact<'_> {
-    /// Estimates the errors of the last step of a run, relative to the maximum displacement. The step with the
+impl ContactStep<'_> {
+    /// After a run: estimates the errors of its last step, relative to the maximum displacement. The step with the
     /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
-    /// promised error. The kept factor is usually good enough.
+    /// promised error. The factor of the last solve is usually good enough.
     pub(crate) fn accuracy(&mut self, outcome: &Outcome) -> Result<Accuracy, PetscError> {
-        let problem = self.problem;
-        let last = &outcome.last;
+        let bounded = self.problem.constraints.bounds.iter().map(|bound| bound.dof);
+        self.elastic.factor().set_condensed(&self.stiffness.matrix, bounded)?;
         let max = outcome.most_displaced().record.displacement_max;
-        let displacement = self.displacement_error(&last.state, max)?;
-        let (gave_up, time) = (self.gave_up, last.state.time);
-        let mut accuracy = Accuracy { displacement, gave_up, energy: 0.0, time };
-        let Some(worst) = &outcome.least_accurate else { return Ok(accuracy) };
-        let ratio = worst.record.kkt_stationarity / last.record.kkt_stationarity;
-        let expected = displacement * ratio.max(1.0);
-        if expected <= Accuracy::promised(problem.tolerance) {
+        let last = self.of_state(&outcome.last.state, max)?;
+        let Some(worst) = &outcome.least_accurate else { return Ok(last) };
+        let ratio = worst.record.kkt_stationarity / outcome.last.record.kkt_stationarity;
+        if last.displacement * ratio.max(1.0) <= Accuracy::promised(self.problem.tolerance) {
+            return Ok(last);
+        }
+        let worst = self.of_state(&worst.state, max)?;
+        Ok(if worst.displacement > last.displacement { worst } else { last })
+    }
+
+    /// Estimates max |K⁻¹(f − Ku)| / `max` with the active nodes fixed, to one digit or more: the correction by the
+    /// residual forces. Collective.
+    fn of_state(&mut self, state: &State, max: f64) -> Result<Accuracy, PetscError> {
+        let Self { problem, stiffness, elastic, load, c, .. } = self;
+        let DiscreteProblem { body, constraints, .. } = problem;
+        let (partition, bases) = (&body.nodes.partition, &constraints.bases);
+        let mut accuracy = Accuracy { time: state.time, ..Accuracy::default() };
+        if max == 0.0 || partition.max_norm(&state.u) == 0.0 {
             return Ok(accuracy);
         }
-        let displacement = self.displacement_error(&worst.state, max)?;
-        if displacement > accuracy.displacement {
-            let (gave_up, time) = (self.gave_up, worst.state.time);
-            accuracy = Accuracy { displacement, gave_up, time, ..accuracy };
-        }
-        Ok(accuracy)
-    }
-
-    /// max |K⁻¹(f − Ku)| / `max` with the active nodes fixed: the correction by the residual forces.
-    fn displacement_error(&mut self, state: &State, max: f64) -> Result<f64, PetscError> {
-        let problem = self.problem;
-        if max == 0.0 || problem.body.nodes.partition.max_norm(&state.u) == 0.0 {
-            return Ok(0.0);
-        }
         let zeta = problem.zeta_at_points(&state.zeta);
-        let internal = problem.terms.internal_force(&problem.body, &zeta, &state.u);
-        let mut residual = problem.motions.balanced(&problem.body, problem.load(state.time));
-        residual.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-        let DiscreteProblem { body, constraints, .. } = problem;
-        let flags = active_bounds(constraints, &state.contact, 0.0);
-        let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
-        self.active = active.map(|(bound, _)| bound.dof).collect();
-        self.stiffness.set_damage(body, &zeta);
-        let correction = self.displacement(residual)?;
-        let max_norm = |u: Vec<f64>| problem.body.nodes.partition.max_norm(&u) / max;
-        Ok(correction.map_or(f64::INFINITY, max_norm))
-    }
-
-    /// K(ζ)⁻¹ times nodal `forces`, N per metre of thickness, with the active nodes fixed: to one digit or
-    /// more. `None` if these nodes do not support the body. Collective.
-    fn displacement(&mut self, mut forces: Vec<f64>) -> Result<Option<Vec<f64>>, PetscError> {
-        let Self { problem, stiffness, active, solver, gave_up, rhs, answer } = self;
-        let bases = &problem.constraints.bases;
+        let internal = problem.terms.internal_force(body, &zeta, &state.u);
+        let mut forces = problem.motions.balanced(body, problem.load(state.time));
+        forces.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
         bases.force_to_local(&mut forces);
         bases.zero_fixed(&mut forces);
+        let flags = active_bounds(constraints, &state.contact, 0.0);
+        let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
+        let active: Vec<_> = active.map(|(bound, _)| bound.dof).collect();
         active.iter().for_each(|&dof| forces[dof] = 0.0);
-        rhs.set(&forces[..rhs.owned()])?;
-        answer.write(|u| u.fill(0.0))?;
-        let norm = rhs.norm()?;
-        // With an old factor, the error may have one digit less than the residual.
-        let prescribed = problem.body.nodes.partition.comm().any(!active.is_empty());
+        load.set(&forces[..load.owned()])?;
+        c.write(|u| u.fill(0.0))?;
+        stiffness.set_damage(body, &zeta);
         let system = LinearSystem {
-            prescribed: prescribed.then_some(&active[..]),
+            prescribed: partition.comm().any(!active.is_empty()).then_some(&active[..]),
             scale: stiffness.scale,
             ..LinearSystem::of(&stiffness.matrix)
         };
-        let solved = solver.solve_renewing(system, rhs, answer, 0.01 * norm)?;
-        *gave_up = solved.gave_up;
-        solved.converged.then(|| displacement(problem, vec![0.0; forces.len()], answer)).transpose()
+        // With an old factor, the error may have one digit less than the residual.
+        let limit = 0.01 * load.norm()?;
+        let solved = elastic.solve_renewing(system, load, c, limit)?;
+        accuracy.gave_up = solved.gave_up;
+        accuracy.displacement = match solved.converged {
+            true => {
+                let correction = displacement(problem, vec![0.0; forces.len()], c)?;
+                partition.max_norm(&correction) / max
+            }
+            false => f64::INFINITY,
+        };
+        Ok(accuracy)
     }
 }
