@@ -167,7 +167,10 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
 fn support(problem: &DiscreteProblem) -> Vec<String> {
     let motions = &problem.motions;
     if motions.all_prevented() {
-        return vec![row("support", "displacements and axes prevent all rigid motions".to_owned())];
+        return vec![row(
+            "support",
+            "the boundary conditions prevent all rigid motions".to_owned(),
+        )];
     }
     let by_contact = |motion| format!("only contact supports the body against {motion}, one way");
     let stands = problem.collapse.map(|Collapse { time, motion }| {

@@ -124,8 +124,8 @@ pub struct SceneArguments {
     /// time.tolerance and the mesh.size of a .geo then have no effect.
     #[arg(long, value_name = "ERROR", value_parser = fraction)]
     accuracy: Option<f64>,
-    /// Ask for the accuracy of this figure alone (work, displacement_max, contact_force, zeta_min, zeta_mean,
-    /// NAME.force_x … as in summary.json), or of several, with commas; a name with a comma stands in quotes.
+    /// Ask for the accuracy of this figure alone, or of several, with commas (`signorini keys --figures` lists
+    /// them); a name with a comma stands in quotes.
     #[arg(long, value_name = "NAME")]
     accuracy_of: Vec<String>,
     /// Begin no finer mesh for the accuracy that would need more memory on all ranks [default: half of the free

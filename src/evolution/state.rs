@@ -125,7 +125,7 @@ impl StepRecord {
             step,
             time: state.time,
             zeta_min: observation.zeta_min.value,
-            zeta_mean: observation.zeta_mean,
+            zeta_mean: problem.body.mean(&state.zeta),
             displacement_max: observation.displacement_max.value,
             work: observation.work,
             contact_force: observation.contact_force,

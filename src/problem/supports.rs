@@ -1,8 +1,7 @@
 //! The boundaries that support the body and the forces they exert.
 
-use super::{ContactLine, boundary_conditions::BoundaryConditions};
+use super::{ContactLine, State, boundary_conditions::BoundaryConditions};
 use crate::{
-    contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
     mesh::{BoundaryFace, Lines, sorted},
     scene::{Boundary, Scene},
@@ -109,10 +108,11 @@ impl Supports {
     pub(super) fn resultants(
         &self,
         body: &Body,
+        state: &State,
         unbalanced: &[f64],
-        (contact, t): (&[ContactPoint], f64),
         stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
     ) -> Vec<[f64; 3]> {
+        let (contact, t) = (&state.contact[..], state.time);
         let mut sums = vec![[0.0; 3]; self.names.len()];
         let points = &body.nodes.points;
         let mut add = |boundary: usize, [x, y]: [f64; 2], [fx, fy]: [f64; 2]| {

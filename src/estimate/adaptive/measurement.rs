@@ -283,8 +283,9 @@ impl Measurement {
             (Dimension::Zeta | Dimension::LeastZeta, _) => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
             (Dimension::Length, Some(at)) => Cause::Around(at, 0),
-            (_, Some(at)) => Cause::Around(at, 1),
-            _ => Cause::FIGURE,
+            (Dimension::Stress, Some(at)) => Cause::Around(at, 1),
+            (Dimension::Length | Dimension::Stress, None) => Cause::FIGURE,
+            (Dimension::Work | Dimension::MeanZeta | Dimension::Place, _) => Cause::FIGURE,
         }
     }
 }

@@ -192,7 +192,9 @@ impl Figures {
         use Governing::{Largest, LargestModulus, Least};
         let (mut all, body) = (Self::default(), Of::Body);
         all.add(&body, [("zeta_min", "least ζ", LeastZeta, Least)], |of, _| of.zeta_min);
-        all.add(&body, [("zeta_mean", "mean ζ", MeanZeta, Least)], |of, _| of.zeta_mean.into());
+        all.add(&body, [("zeta_mean", "mean ζ", MeanZeta, Least)], |of, _| {
+            of.problem.body.mean(&of.state.zeta).into()
+        });
         let most = ("displacement_max", "largest displacement", Length, Largest);
         all.add(&body, [most], |of, _| of.displacement_max);
         let work = ("work", "work of the loads", Work, LargestModulus);

@@ -6,11 +6,14 @@ use crate::{
     problem::{ContactFigures, ContactRow, DiscreteProblem, MeanDisplacement, State, rows_of},
 };
 
-/// What the figures of a state are read from; the same on all ranks.
-pub(crate) struct Observation {
-    /// min ζ and ∫ζ/|Ω|.
+/// What the figures of a state are read from: the state, which is that of this rank, and sums that are the same on all ranks.
+pub(crate) struct Observation<'a> {
+    /// See `state`.
+    pub problem: &'a DiscreteProblem,
+    /// A figure that is read from these two must be collective.
+    pub state: &'a State,
+    /// min ζ.
     pub zeta_min: Value,
-    pub zeta_mean: f64,
     /// Maximum nodal |u|, m.
     pub displacement_max: Value,
     /// fᵀu, of the loads alone, J per metre of thickness.
@@ -35,13 +38,13 @@ impl DiscreteProblem {
     ///
     /// # Errors
     /// PETSc failed.
-    pub(crate) fn observe(
-        &self,
-        state: &State,
+    pub(crate) fn observe<'a>(
+        &'a self,
+        state: &'a State,
         load: &[f64],
         unbalanced: &[f64],
         rounding: f64,
-    ) -> Result<(Observation, Vec<Value>), PetscError> {
+    ) -> Result<(Observation<'a>, Vec<Value>), PetscError> {
         let seen = Observation::new(self, state, load, unbalanced)?;
         let displacement = SHOWN_AS_ZERO * seen.displacement_max.value;
         let values = self.without_rounding(self.figures.values(&seen), (rounding, displacement));
@@ -49,14 +52,14 @@ impl DiscreteProblem {
     }
 }
 
-impl Observation {
+impl<'a> Observation<'a> {
     /// The observation of a state with the nodal loads `load` and the residual forces `unbalanced` = f − Ku. Collective.
     ///
     /// # Errors
     /// PETSc failed.
     fn new(
-        problem: &DiscreteProblem,
-        state: &State,
+        problem: &'a DiscreteProblem,
+        state: &'a State,
         load: &[f64],
         unbalanced: &[f64],
     ) -> Result<Self, PetscError> {
@@ -66,8 +69,7 @@ impl Observation {
         let stress = |t: usize, at: [f64; 3]| {
             problem.terms.elasticity.stress_at(body, (t, at), &zeta, &state.u)
         };
-        let contact = (&state.contact[..], state.time);
-        let mut resultants = problem.supports.resultants(body, unbalanced, contact, stress);
+        let mut resultants = problem.supports.resultants(body, state, unbalanced, stress);
         comm.sum(resultants.as_flattened_mut());
         let mut probes = problem.probes.values(problem, state);
         comm.sum(probes.as_flattened_mut());
@@ -81,8 +83,9 @@ impl Observation {
         let least = greatest(comm, vertices.map(|(zeta, at)| (-zeta, *at)));
         let active = state.contact.iter().filter(|point| point.active);
         Ok(Self {
+            problem,
+            state,
             zeta_min: Value { value: -least.value, ..least },
-            zeta_mean: body.mean(&state.zeta),
             displacement_max: Value { value: farthest.value.sqrt(), ..farthest },
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.

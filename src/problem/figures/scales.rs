@@ -142,7 +142,8 @@ impl DiscreteProblem {
                 Dimension::Force => force,
                 Dimension::Moment => lever * force,
                 Dimension::Stress => force / lever,
-                _ => 0.0,
+                Dimension::Work | Dimension::ContactLength | Dimension::Place => 0.0,
+                Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 0.0,
             };
             // No -0.
             *value = if value.abs() <= rounding { 0.0 } else { *value + 0.0 };
@@ -164,10 +165,11 @@ impl DiscreteProblem {
         for (bar, now) in bars.iter_mut().zip(now) {
             bar.bar += self.tolerance * bar.scale;
             bar.bar += match bar.dimension {
-                dimension if dimension.is_damage() => 0.0,
+                Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 0.0,
                 Dimension::Force => force.max(of_loads * bar.scale),
                 Dimension::Moment => (lever * force).max(of_loads * bar.scale),
-                _ => of_loads * bar.scale,
+                Dimension::Work | Dimension::Length | Dimension::Stress => of_loads * bar.scale,
+                Dimension::ContactLength | Dimension::Place => of_loads * bar.scale,
             };
             bar.bar += match bar.dimension {
                 Dimension::LeastZeta => zeta_min,
@@ -175,7 +177,10 @@ impl DiscreteProblem {
                 Dimension::Zeta => zeta,
                 // σ = ζ𝒜ε(u).
                 Dimension::Stress => (displacement + zeta) * now,
-                _ => displacement * now,
+                Dimension::Work | Dimension::Length | Dimension::Force => displacement * now,
+                Dimension::Moment | Dimension::ContactLength | Dimension::Place => {
+                    displacement * now
+                }
             };
         }
     }
@@ -185,9 +190,10 @@ impl Figures {
     /// The sizes of all figures, from which their scales come: |value|, and 1 − ζ for a damage.
     pub(crate) fn sizes(&self, values: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let size = |(figure, value): (&Figure, f64)| match figure.dimension {
-            dimension if dimension.is_damage() => 1.0 - value,
+            Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 1.0 - value,
             Dimension::Place => 0.0,
-            _ => value.abs(),
+            Dimension::Work | Dimension::Length | Dimension::Force => value.abs(),
+            Dimension::Moment | Dimension::Stress | Dimension::ContactLength => value.abs(),
         };
         self.iter().zip(values).map(size).collect()
     }
