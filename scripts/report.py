@@ -121,13 +121,18 @@ def template():
     return [Template(text) for text in spec.loader.get_data(path).decode().split("<!-- slider -->\n")]
 
 
-def said(figure, value):
+def is_flagged(figure, extreme):
+    """Does the reason why the mesh does not determine the last value hold for an extreme of the run? It knows one place."""
+    return extreme["value"] == figure["value"] or extreme["at"] is not None and extreme["at"] == figure["at"]
+
+
+def said(figure, value, flagged=True):
     """A value of a figure as text: with its bar if it is that of the last state, and with two digits and the reason if
-    the mesh does not determine it."""
+    the mesh does not determine it. The reason may not hold at another place and time."""
     if value is None:
         return "–"
     flag, _ = flag_of(figure)
-    if flag:
+    if flag and flagged:
         return f"{value:.2g}, {flag}"
     return value == figure["value"] and barred(value, figure["bar"]) or f"{float(f'{value:.4g}'):g}"
 
@@ -140,12 +145,13 @@ def governing(results):
         extreme = figure["governing"]
         if "." in name or extreme is None:
             continue
-        text, last, place = said(figure, extreme["value"]), said(figure, figure["value"]), extreme["at"]
-        time = results.when(extreme["time"])
+        flagged, place = is_flagged(figure, extreme), extreme["at"]
+        text, last = said(figure, extreme["value"], flagged), said(figure, figure["value"])
+        time = f"{extreme['time']:g}"
         if name == "zeta_min" and is_stopped:
             text, time = "reached ζ_*", results.stopping_time
         rows.append((figure["label"], text, figure["unit"], time, f"({place[0]:.4g}, {place[1]:.4g})" if place else "",
-                     last * (last != text), flag_of(figure)[1]))
+                     last * (last != text), flag_of(figure)[1] if flagged else ""))
     before = ", before the stop" if results.summary.get("stopped_by") else ""
     head = ("", "over all steps", "", f"at t ({results.units['time']})", f"at ({results.units['length']})",
             f"last state{before}", "why not determined")
@@ -167,15 +173,15 @@ def by_name(results, with_places=True):
         pairs = {kind: f"{kind[:-1]}y" for kind in kinds if kind.endswith("_x") and f"{kind[:-1]}y" in kinds}
         columns = [(kind, pairs[kind]) if kind in pairs else (kind,) for kind in kinds if kind not in pairs.values()]
         first = [(figures[f"{group[0]}.{column[0]}"], len(column)) for column in columns]
-        of_name = re.compile(rf" (of|at|in) {re.escape(group[0])}(?!\w)")
+        of_name = re.compile(rf" (of|at|in) ({re.escape(group[0])}|the rest of the body)(?!\w)")
         head = [f"{of_name.sub('', of['label'])[:-3 if count == 2 else None]} ({of['unit']})" for of, count in first]
         rows = []
         for name in group:
             cells = [[figures[f"{name}.{kind}"] for kind in column] for column in columns]
             last = [_cell((of, of["value"]) for of in cell) for cell in cells]
             extremes = [[(of, of["governing"]) for of in cell if of["governing"]] for cell in cells]
-            most = [_cell((of, extreme["value"]) for of, extreme in cell) for cell in extremes]
-            times = [", ".join(dict.fromkeys(results.when(extreme["time"]) for _, extreme in cell)) for cell in extremes]
+            most = [_cell((of, extreme["value"], is_flagged(of, extreme)) for of, extreme in cell) for cell in extremes]
+            times = [", ".join(dict.fromkeys(f"{extreme['time']:g}" for _, extreme in cell)) for cell in extremes]
             shown = [f"{text} at t = {time}" * (text not in ("", value))
                      for text, time, value in zip(most, times, last)]
             rows += [[name, *last]] + [["   extreme", *shown]] * any(shown)

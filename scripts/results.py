@@ -113,11 +113,6 @@ class Results:
             return f"the last state before t = {self.stopping_time} {self.units['time']}"
         return f"t = {self.time:g} {self.units['time']}"
 
-    def when(self, time):
-        """A time of the run as text. The last one before a stop is computed, and not exact."""
-        is_exact = not self.summary.get("stopped_by") or time != self.summary["end_time"]
-        return f"{time:g}" if is_exact else self.stopping_time
-
     @property
     def part(self):
         """The time of the state and the shown material, for titles of maps."""

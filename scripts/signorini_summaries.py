@@ -69,10 +69,9 @@ def named(columns):
 
 
 def bars(summary):
-    """The error bars of a run by the names of figures, and that of the time of a stop, and of the last state before it;
-    empty without estimates."""
+    """The error bars of a run by the names of figures, and that of the time of a stop; empty without estimates."""
     found = {name: of.get("bar") for name, of in (summary.get("figures") or {}).items()}
-    found["stopped_at"] = found["end_time"] = summary.get("stopped_uncertainty")
+    found["stopped_at"] = summary.get("stopped_uncertainty")
     return {name: bar for name, bar in found.items() if bar is not None}
 
 

@@ -1,16 +1,24 @@
 //! Suggestions for unknown names in messages.
 
-/// The end of a message about an unknown `name`: the most similar `known` name, and the list of all.
+/// Longer lists of names are not shown.
+const LIST: usize = 16;
+
+/// The end of a message about an unknown `name`: the most similar `known` name, and the list of all, or of the nearest three
+/// of many.
 pub(crate) fn suggestion(name: &str, known: &[impl AsRef<str>]) -> String {
-    let (name, known) = (name.to_lowercase(), Vec::from_iter(known.iter().map(AsRef::as_ref)));
-    let likeness = |known: &str| strsim::normalized_damerau_levenshtein(&name, known);
-    let rated = known.iter().map(|known| (likeness(&known.to_lowercase()), known));
-    let nearest = rated.reduce(|best, other| if other.0 > best.0 { other } else { best });
-    match nearest {
-        None => " (there are none)".to_owned(),
-        Some((likeness, meant)) if likeness >= 0.5 => {
-            format!("; did you mean `{meant}`? (known: {})", known.join(", "))
-        }
-        Some(_) => format!(" (known: {})", known.join(", ")),
+    let known = Vec::from_iter(known.iter().map(AsRef::as_ref));
+    let likeness = |known: &&str| {
+        strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &known.to_lowercase())
+    };
+    let mut nearest = known.clone();
+    nearest.sort_by(|a, b| likeness(b).total_cmp(&likeness(a)));
+    let list = match known.len() {
+        0 => return " (there are none)".to_owned(),
+        ..=LIST => format!("known: {}", known.join(", ")),
+        all => format!("nearest of {all}: {}", nearest[..3].join(", ")),
+    };
+    match likeness(&nearest[0]) >= 0.5 {
+        true => format!("; did you mean `{}`? ({list})", nearest[0]),
+        false => format!(" ({list})"),
     }
 }

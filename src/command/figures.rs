@@ -30,6 +30,17 @@ pub(super) struct LastFigure<'a> {
     governing: Option<GoverningValue>,
 }
 
+impl LastFigure<'_> {
+    /// Why the mesh does not determine it, in a word; "" if it does.
+    fn reason(&self) -> &'static str {
+        match (&self.singular, &self.unresolved) {
+            (Some(_), _) => ": singular",
+            (None, Some(_)) => ": not resolved",
+            (None, None) => "",
+        }
+    }
+}
+
 /// The figures of the last state, and how they are written.
 pub(super) struct LastFigures<'a> {
     pub(super) all: Vec<LastFigure<'a>>,
@@ -101,17 +112,12 @@ impl<'a> LastFigures<'a> {
         let Some(of) = self.get(name) else { return String::new() };
         let at = of.at.filter(|_| of.figure.is_extreme());
         let at = at.map_or_else(String::new, |at| format!(" at {}", self.mesh.place(at)));
-        let reason = match (&of.singular, &of.unresolved) {
-            (Some(_), _) => ": singular",
-            (None, Some(_)) => ": not resolved",
-            (None, None) => "",
-        };
-        format!("{} {}{at}{reason}", self.written(of, of.value), of.unit)
+        format!("{} {}{at}{}", self.written(of, of.value), of.unit, of.reason())
     }
 
     fn written(&self, of: &LastFigure, value: f64) -> String {
         match of.bar {
-            _ if of.singular.is_some() || of.unresolved.is_some() => plain(value, 2),
+            _ if !of.reason().is_empty() => plain(value, 2),
             Some(bar) => with_bar(value, Some(bar)),
             None if of.figure.is_extreme() => plain(value, self.of_stress),
             None => plain(value, self.digits),
@@ -146,8 +152,15 @@ impl<'a> LastFigures<'a> {
                 true => [1.0 - of.value, 1.0 - governing.value],
                 false => [of.value.abs(), governing.value.abs()],
             };
-            let value =
-                || format!("{} {}", plain(governing.value, 4), of.unit).trim_end().to_owned();
+            // The reason why the mesh does not determine the last value holds at its place.
+            let (digits, reason) = match of.figure.is_extreme() && governing.at == of.at {
+                true if !of.reason().is_empty() => (2, of.reason()),
+                _ => (4, ""),
+            };
+            let value = || {
+                let value = format!("{} {}", plain(governing.value, digits), of.unit);
+                format!("{}{reason}", value.trim_end())
+            };
             (last < SMALLER * most).then(|| (of.label, value(), governing.time))
         })
     }

@@ -236,7 +236,7 @@ impl Figures {
                 all.add(&of, means, move |of, k| of.means[i].displacement[k].into());
             }
             if boundary.moves {
-                let travel = ("travel", "travel of the foundation@", Place, LargestModulus);
+                let travel = ("travel", "travel of the foundation@", Length, LargestModulus);
                 all.add(&of, [travel], move |of, _| of.means[i].travel.into());
             }
             if let Some(foundation) = boundary.foundation {
