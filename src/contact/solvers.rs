@@ -110,7 +110,7 @@ pub struct ContactReport {
     pub linear_iterations: usize,
     /// Factorisations of our own factor. Those of a preconditioner that PETSc options choose are not counted.
     pub factorisations: usize,
-    /// How often the method changed to a slower variant that always ends, and how often another solver replaced it.
+    /// How often another solver replaced the method.
     pub fallbacks: usize,
     /// The solver that computed the answer in place of the chosen one.
     pub rescued_by: Option<&'static str>,

@@ -81,9 +81,6 @@ impl Outcome {
             (skipped > 0 && problem.damage().is_some()).then(|| {
                 format!("the damage solve was skipped in {skipped} of {steps} steps: no source, uniform ζ")
             }),
-            (self.fallbacks > 0).then(|| {
-                format!("in {} the contact solver left its fast path", counted(self.fallbacks))
-            }),
             (self.rejected > 0)
                 .then(|| format!("{} steps were rejected and tried again, shorter", self.rejected)),
             self.adaptive_steps_note(problem, false),

@@ -25,8 +25,6 @@ pub struct Outcome {
     pub skipped_damage_solves: usize,
     /// Rejected steps, made again shorter.
     pub rejected: usize,
-    /// Steps in which the solver that gave the answer left its fast path.
-    pub fallbacks: usize,
     /// The number of steps in which another solver gave the answer, and its name.
     pub rescued: Option<(usize, String)>,
     /// The violation of the bounds on ζ.
@@ -118,9 +116,6 @@ impl Outcome {
         let Step { record, report, unconstrained, .. } = &self.last;
         self.kkt = self.kkt.max(&record.kkt());
         self.skipped_damage_solves += usize::from(self.last.skipped_damage_solve);
-        // A rescue counts as one fallback of the step.
-        let rescues = usize::from(report.rescued_by.is_some());
-        self.fallbacks += usize::from(report.fallbacks > rescues);
         if let Some(solver) = report.rescued_by {
             self.rescued.get_or_insert((0, solver.to_owned())).0 += 1;
         }

@@ -66,7 +66,7 @@ pub struct StepRecord {
     pub linear_iterations: usize,
     /// Factorisations, except by a preconditioner from PETSc options.
     pub factorisations: usize,
-    /// Times the contact solver left its fast path.
+    /// Times another contact solver gave the answer.
     pub fallbacks: usize,
     /// Contraction per iteration of a fixed-point method; empty for others.
     pub contraction: Option<f64>,

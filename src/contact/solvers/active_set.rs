@@ -8,7 +8,7 @@ use crate::{
     linear::LinearSolver,
     petsc::{PetscError, Vector},
 };
-use pivoting::{AtBounds, Pivoting, constrain_rigid_motions, pivot_condensed};
+use pivoting::{AtBounds, MAX_PIVOTS, constrain_rigid_motions, pivot, pivot_condensed};
 
 pub(super) const ACTIVE_SET: SolverEntry = SolverEntry {
     name: "active-set",
@@ -30,8 +30,8 @@ pub(super) const ACTIVE_SET: SolverEntry = SolverEntry {
 /// is the first of this one.
 ///
 /// A condensed factor, perhaps of K at an earlier ζ, gives a small problem for the bounded unknowns. The
-/// method first finds the active set of this problem, and then checks the set with K. [`Pivoting`] has the
-/// rules for both.
+/// method first finds the active set of this problem, and then checks the set with K. [`pivot`] has the
+/// rule for both.
 ///
 /// The active set has an entry per bound: 1 if the upper bound is active, −1 if the lower one is, else 0.
 pub(super) struct ActiveSet {
@@ -52,18 +52,17 @@ impl ContactSolver for ActiveSet {
         c: &mut Vector,
     ) -> Result<ContactReport, ContactError> {
         let mut report = ContactReport::default();
-        let mut pivoting = Pivoting::new(problem);
+        debug_assert!(problem.bounds.is_sorted_by_key(|bound| bound.dof));
         first_guess(problem, warm, c)?;
-        for _ in 0..pivoting.limit() {
+        for _ in 0..MAX_PIVOTS {
             let before = report.iterations;
-            let small = pivoting.is_fast() && elastic.is_condensed(problem.stiffness)?;
-            let answer = match small {
+            let answer = match elastic.is_condensed(problem.stiffness)? {
                 true => self.solve_condensed(problem, elastic, warm, c, &mut report)?,
                 false => self.solve_whole(problem, elastic, warm, c, &mut report)?,
             };
             // A guess counts as one iteration, or as the iterations of the small problem.
             report.iterations = report.iterations.max(before + 1);
-            if !pivoting.pivot(warm, &answer, &mut report.fallbacks)? {
+            if !pivot(problem, warm, &answer)? {
                 return Ok(report);
             }
         }
@@ -133,12 +132,6 @@ fn first_guess(
     let c = problem.at_bounds(c)?;
     if active.len() != problem.bounds.len() {
         *active = problem.bounds.iter().zip(&c).map(|(b, c)| b.side(*c)).collect();
-    }
-    // The last problem may have had a lower bound that this one lacks.
-    for (side, bound) in active.iter_mut().zip(problem.bounds) {
-        if *side < 0.0 && bound.lower.is_infinite() {
-            *side = 0.0;
-        }
     }
     constrain_rigid_motions(problem, active, &c);
     Ok(())

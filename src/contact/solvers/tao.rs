@@ -135,22 +135,17 @@ impl ContactSolver for Tao {
                 (unit, *warm) = (found, vec![found]);
             }
             let residuals = problem.residuals(c)?;
-            if residuals.within(0.5 * problem.tolerance) {
+            if residuals.within(problem.tolerance) {
                 return Ok(report);
             }
-            report.false_claims +=
-                usize::from(answer.reason > 0 && !residuals.within(problem.tolerance));
+            report.false_claims += usize::from(answer.reason > 0);
             let worst = residuals.worst();
             stalled = if worst < 0.5 * best { 0 } else { stalled + 1 };
             best = best.min(worst);
-            let good = residuals.within(problem.tolerance) && stalled > 0;
-            if worst.is_nan() || stalled == STALLED || good {
+            if worst.is_nan() || stalled == STALLED {
                 break (answer.reason, residuals);
             }
         };
-        if residuals.within(problem.tolerance) {
-            return Ok(report);
-        }
         let detail = format!(
             "{} (TaoConvergedReason {reason}, {} false claims of convergence)",
             residuals.missed(problem.tolerance),
