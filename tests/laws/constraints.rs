@@ -274,3 +274,17 @@ fn a_body_carried_along_by_its_prescribed_side_feels_no_force() {
         }
     }
 }
+
+#[test]
+fn a_body_that_is_carried_far_keeps_the_digits_of_its_deformation() {
+    // The side moves by up to 1e9 times the deformation by the load.
+    for far in [1.0, 1e3, 1e6] {
+        let problem = bounded(&format!(
+            "boundary = [{{ name = 'left', displacement = [{far:?}, {far:?}] }},
+                         {{ name = 'right', traction = [1e-3, 0] }}]"
+        ))
+        .unwrap();
+        let residuals = run(&problem, SOLVERS[0]).kkt;
+        assert!(residuals.within(problem.tolerance), "{far}: {residuals}");
+    }
+}
