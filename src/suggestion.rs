@@ -14,7 +14,7 @@ pub(crate) fn suggestion(name: &str, known: &[impl AsRef<str>]) -> String {
     nearest.sort_by(|a, b| likeness(b).total_cmp(&likeness(a)));
     let list = match known.len() {
         0 => return " (there are none)".to_owned(),
-        ..=LIST => format!("known: {}", known.join(", ")),
+        1..=LIST => format!("known: {}", known.join(", ")),
         all => format!("nearest of {all}: {}", nearest[..3].join(", ")),
     };
     match likeness(&nearest[0]) >= 0.5 {

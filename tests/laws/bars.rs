@@ -86,10 +86,10 @@ fn a_figure_asked_for_alone_takes_a_smaller_mesh() {
     assert!(4 * mesh.triangles.len() < 3 * all, "{} of {all}", mesh.triangles.len());
 
     let session = Session::start(&[]).unwrap();
-    let wrong = block(2, "accuracy = 3e-3\naccuracy_of = ['force']", "0", "-5");
+    let wrong = block(2, "accuracy = 3e-3\naccuracy_of = ['contact_forces']", "0", "-5");
     let found = estimate::adapted(&session, &wrong, square(2), SOLVERS[0], 3e-3, &mut |_| {});
     let message = found.err().map_or_else(String::new, |error| error.to_string());
-    assert!(message.contains("`force`") && message.contains("contact_force"), "{message}");
+    assert!(message.contains("did you mean `contact_force`"), "{message}");
 }
 
 #[test]
