@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Draws the rooms of src/ from their `use` lines: which room uses which, their lines of code, and what they are for.
+"""Draws the rooms of src/ from their `use` lines: which room uses which, and what they are for.
 
     scripts/architecture.py geo/rooms.svg
 
@@ -36,11 +36,6 @@ def used(room, names):
     return [name for name in names if name in words and name != room]
 
 
-def lines(room):
-    """The lines of code, without blanks and comments."""
-    return sum(bool(line.strip()) and not line.lstrip().startswith("//") for of in files(room) for line in of.splitlines())
-
-
 def purpose(room):
     """The first sentence about the room."""
     text = (SOURCES / room / "mod.rs").read_text(encoding="utf-8")
@@ -69,8 +64,7 @@ def draw(path):
     figure, axes = plt.subplots(figsize=(9, 0.45 * len(names)), layout="constrained")
     for y, room in enumerate(names):
         axes.text(0, y, room, weight="bold", va="center", ha="right", size=12)
-        axes.text(0.15, y, f"{lines(room)}", va="center", color="0.45", size=9)
-        axes.text(0.9, y, textwrap.fill(purpose(room), 84), va="center", size=9)
+        axes.text(0.3, y, textwrap.fill(purpose(room), 84), va="center", size=9)
     for room, below in needed(uses).items():
         for of in below:
             top, foot = names.index(room), names.index(of)

@@ -21,7 +21,7 @@ use std::{
 };
 
 /// The first line of a file.
-const FORMAT: &[u8] = b"signorini checkpoint 5\n";
+const FORMAT: &[u8] = b"signorini checkpoint 6\n";
 
 /// The state of a run between two steps.
 #[derive(Serialize, Deserialize)]

@@ -51,8 +51,8 @@ pub(super) struct LastFigures<'a> {
     of_stress: usize,
 }
 
-/// The extremes below these times the largest one of the run are shown with that.
-const SMALLER: f64 = 0.999;
+/// The extreme of a run is shown if it differs by more than this fraction from the last value.
+const DIFFERENT: f64 = 1e-3;
 
 impl<'a> LastFigures<'a> {
     /// The figures of the step `last` of a run, whose `extremes` the mesh may not determine.
@@ -135,8 +135,8 @@ impl<'a> LastFigures<'a> {
         place[0].is_finite().then(|| self.mesh.place(place))
     }
 
-    /// The figures of the body and of contact whose extreme in the run is larger than their last value: the label, the value
-    /// and the time.
+    /// The figures of the body and of contact whose extreme in the run is another value than the last one: the label, the
+    /// extreme and its time.
     pub(super) fn governing(&self) -> impl Iterator<Item = (&str, String, f64)> {
         // A lone foundation has the pressure of the whole.
         let several = self.all.iter().filter(|of| of.figure.is_pressure()).count() > 2;
@@ -150,7 +150,7 @@ impl<'a> LastFigures<'a> {
             // Near 1, a damage is what counts.
             let [last, most] = match of.figure.dimension.is_damage() {
                 true => [1.0 - of.value, 1.0 - governing.value],
-                false => [of.value.abs(), governing.value.abs()],
+                false => [of.value, governing.value],
             };
             // The reason why the mesh does not determine the last value holds at its place.
             let (digits, reason) = match of.figure.is_extreme() && governing.at == of.at {
@@ -161,7 +161,8 @@ impl<'a> LastFigures<'a> {
                 let value = format!("{} {}", plain(governing.value, digits), of.unit);
                 format!("{}{reason}", value.trim_end())
             };
-            (last < SMALLER * most).then(|| (of.label, value(), governing.time))
+            let differs = (most - last).abs() > DIFFERENT * most.abs().max(last.abs());
+            differs.then(|| (of.label, value(), governing.time))
         })
     }
 }

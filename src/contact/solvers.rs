@@ -58,7 +58,7 @@ pub const PREFIX: &str = "elastic_";
 ///         while report.iterations < 100_000 {
 ///             report.iterations += 1;
 ///             for i in 0..x.len() {
-///                 // NodalConstraint i of K: r = f_i − Σ K_ij x_j.
+///                 // Row i of K: r = f_i − Σ K_ij x_j.
 ///                 let (r, diagonal) = problem.stiffness.read_row(i as i32, |columns, values| {
 ///                     let row = columns.iter().zip(values);
 ///                     row.fold((load[i], 0.0), |(r, d), (&j, k)| {

@@ -30,7 +30,7 @@ use crate::{
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
-    problem::{Bar, Collapse, Dimension, DiscreteProblem, LoadCurve, SetupError},
+    problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
     scene::{Scene, Stepping, rounded},
 };
 pub use few_step_run::INSTANTS;
@@ -178,7 +178,7 @@ fn with_passing_loads(
     accuracy: f64,
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-    let figures = problem.figures.iter().filter(|of| of.dimension != Dimension::Place);
+    let figures = problem.figures.iter().filter(|of| of.dimension.has_bar());
     let names = Vec::from_iter(figures.map(|figure| &*figure.name));
     scene.check_figures(&names).map_err(SetupError::from)?;
     if let Some(Collapse { time, .. }) = problem.collapse_on_a_point() {

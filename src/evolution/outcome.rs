@@ -48,9 +48,9 @@ pub struct Outcome {
     /// With adaptive steps: the estimated error of the last ζ from the time steps, relative to the damage done.
     #[serde(skip)]
     pub damage_error: Option<f64>,
-    /// Of all steps before the last one: the step with the largest stationarity residual, and the step with the largest
-    /// displacement.
+    /// The step with the largest stationarity residual before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
+    /// The step with the largest displacement before the last step.
     most_displaced: Option<Rc<Step>>,
 }
 

@@ -1,4 +1,4 @@
-//! The register of tuned constants is what the comments in the code say, and each constant has a name of its own.
+//! What pages tell about the code is so: the register of tuned constants, and the order of the rooms.
 
 use std::{env, fs, path::Path, process::Command};
 
@@ -12,4 +12,17 @@ fn the_register_of_tuned_constants_is_made_of_their_comments_and_each_name_means
     let page = fs::read_to_string(root.join("validation/CONSTANTS.md")).expect("it is there");
     assert!(String::from_utf8_lossy(&made.stdout) == page, "out of date: make constants");
     assert!(page.matches("\n| `").count() > 25, "the register is nearly empty");
+}
+
+#[test]
+fn a_room_uses_only_rooms_before_it() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let picture = tempfile::NamedTempFile::with_suffix(".svg").expect("a file");
+    let drawn = Command::new(env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned()))
+        .arg("scripts/architecture.py")
+        .arg(picture.path())
+        .current_dir(root)
+        .output()
+        .expect("Python");
+    assert!(drawn.status.success(), "{}", String::from_utf8_lossy(&drawn.stderr));
 }

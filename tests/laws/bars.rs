@@ -160,3 +160,29 @@ fn a_force_that_statics_determines_is_off_by_no_more_than_its_bar_wherever_a_loa
     let largest = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
     assert!(largest(&errors) > 1e-8 && largest(&bars) < 1e-5);
 }
+
+/// The travel of a foundation is given: it has no bar, and is no scale of displacements.
+#[test]
+fn a_foundation_that_comes_from_far_away_leaves_the_bars_as_they_are() {
+    let bars = [0.0, 10.0].map(|far: f64| {
+        let scene = scene(&format!(
+            "material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
+             time = {{ end = 1, step = 0.25 }}
+             boundary = [{{ name = 'top', displacement = [0, 0] }},
+                         {{ name = 'bottom', gap = '{far}*(1 - t)^4 - 0.01*t' }}]"
+        ));
+        let problem = DiscreteProblem::new(scene.clone(), square(4)).unwrap();
+        let mut outcome = solved(scene.clone(), square(4));
+        let session = Session::start(&[]).unwrap();
+        let measured =
+            estimate::measured_errors(&session, &scene, &square(4), SOLVERS[0], None).unwrap();
+        outcome.set_bars(&problem, &measured);
+        let travel = crate::support::figures(&problem, &outcome.last)["bottom.travel"];
+        assert!((travel - far - 0.01).abs() < 1e-12, "{travel}");
+        assert!(outcome.bars.iter().all(|bar| bar.name != "bottom.travel"));
+        outcome.bars.iter().map(|bar| (bar.name.clone(), bar.relative())).collect::<Vec<_>>()
+    });
+    for ((name, near), (_, far)) in bars[0].iter().zip(&bars[1]) {
+        assert!((near - far).abs() <= 1e-6 * near.max(1e-9), "{name}: {near}, {far}");
+    }
+}

@@ -285,7 +285,8 @@ impl Measurement {
             (Dimension::Length, Some(at)) => Cause::Around(at, 0),
             (Dimension::Stress, Some(at)) => Cause::Around(at, 1),
             (Dimension::Length | Dimension::Stress, None) => Cause::FIGURE,
-            (Dimension::Work | Dimension::MeanZeta | Dimension::Place, _) => Cause::FIGURE,
+            (Dimension::Work | Dimension::MeanZeta, _) => Cause::FIGURE,
+            (Dimension::Place | Dimension::Given, _) => Cause::FIGURE,
         }
     }
 }

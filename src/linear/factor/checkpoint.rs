@@ -28,7 +28,7 @@ pub struct FactorState {
 pub(in crate::linear) type History = (Option<RefactorisationPolicy>, usize);
 
 impl FactorState {
-    /// Of no factor yet.
+    /// The state before the first factorisation.
     pub(super) fn new(precision: Precision) -> Self {
         Self { values: Vec::new(), precision, policy: None, applications: 0, factorisations: 0 }
     }

@@ -38,6 +38,8 @@ pub enum Dimension {
     ContactLength,
     /// A coordinate of a place, m. It has no error bar and no extreme in a run.
     Place,
+    /// A length that the scene gives, m. It has no error.
+    Given,
 }
 
 impl Dimension {
@@ -45,12 +47,17 @@ impl Dimension {
     pub fn unit(self, units: &Units) -> String {
         match self {
             Self::Work => units.work(),
-            Self::Length | Self::ContactLength | Self::Place => units.length.clone(),
+            Self::Length | Self::ContactLength | Self::Place | Self::Given => units.length.clone(),
             Self::Force => format!("{}/{}", units.force, units.length),
             Self::Moment => units.force.clone(),
             Self::Zeta | Self::LeastZeta | Self::MeanZeta => String::new(),
             Self::Stress => units.stress.clone(),
         }
+    }
+
+    /// Has a figure of it an error bar?
+    pub fn has_bar(self) -> bool {
+        !matches!(self, Self::Place | Self::Given)
     }
 
     /// Is it a value of ζ?
@@ -149,7 +156,7 @@ impl Figure {
 /// The parts of a scene of which there are figures, by their names.
 #[derive(Default)]
 pub(crate) struct Parts<'a> {
-    /// Of several materials.
+    /// The materials, if there are several.
     pub materials: Vec<&'a str>,
     /// The boundaries with a table.
     pub boundaries: Vec<PartOfBoundary<'a>>,
@@ -187,7 +194,8 @@ impl Figures {
     /// The list of all figures.
     pub(crate) fn new(parts: &Parts) -> Self {
         use Dimension::{
-            ContactLength, Force, LeastZeta, Length, MeanZeta, Moment, Place, Stress, Work, Zeta,
+            ContactLength, Force, Given, LeastZeta, Length, MeanZeta, Moment, Place, Stress, Work,
+            Zeta,
         };
         use Governing::{Largest, LargestModulus, Least};
         let (mut all, body) = (Self::default(), Of::Body);
@@ -236,7 +244,7 @@ impl Figures {
                 all.add(&of, means, move |of, k| of.means[i].displacement[k].into());
             }
             if boundary.moves {
-                let travel = ("travel", "travel of the foundation@", Length, LargestModulus);
+                let travel = ("travel", "travel of the foundation@", Given, LargestModulus);
                 all.add(&of, [travel], move |of, _| of.means[i].travel.into());
             }
             if let Some(foundation) = boundary.foundation {

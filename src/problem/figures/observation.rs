@@ -20,9 +20,10 @@ pub(crate) struct Observation<'a> {
     pub work: f64,
     /// Σ normal reactions of Γ_C, N per metre of thickness.
     pub contact_force: f64,
-    /// Of the body, and of each of several materials: the largest von Mises stress and σ₁, and the smallest σ₂, Pa.
+    /// The largest von Mises stress, the largest σ₁ and the smallest σ₂, Pa: first those of the body, then those of each
+    /// material if there are several.
     pub stresses: Vec<[Value; 3]>,
-    /// Of Γ_C and of each foundation.
+    /// The figures of Γ_C, then those of each foundation.
     pub contact: Vec<ContactFigures>,
     /// Per support: F_x, F_y, N per metre of thickness, and the moment about the origin, N.
     pub resultants: Vec<[f64; 3]>,

@@ -61,7 +61,7 @@ impl DiscreteProblem {
             Bar { name: of.name.clone(), dimension: of.dimension, bar, scale }
         };
         let figures = self.figures.iter().zip(errors.iter().zip(scales));
-        figures.filter(|(of, _)| of.dimension != Dimension::Place).map(bar).collect()
+        figures.filter(|(of, _)| of.dimension.has_bar()).map(bar).collect()
     }
 
     /// The extreme of the part in which the extreme `number` lies; itself if it has no parts.
@@ -120,7 +120,7 @@ impl DiscreteProblem {
                 Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => NEGLIGIBLE_DAMAGE,
                 Dimension::Stress => MIN_PART * mean_stress,
                 // A sum of lengths of edges has no rounding.
-                Dimension::ContactLength | Dimension::Place => 0.0,
+                Dimension::ContactLength | Dimension::Place | Dimension::Given => 0.0,
             };
             own.max(least)
         };
@@ -142,7 +142,8 @@ impl DiscreteProblem {
                 Dimension::Force => force,
                 Dimension::Moment => lever * force,
                 Dimension::Stress => force / lever,
-                Dimension::Work | Dimension::ContactLength | Dimension::Place => 0.0,
+                Dimension::Work | Dimension::ContactLength => 0.0,
+                Dimension::Place | Dimension::Given => 0.0,
                 Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 0.0,
             };
             // No -0.
@@ -169,7 +170,8 @@ impl DiscreteProblem {
                 Dimension::Force => force.max(of_loads * bar.scale),
                 Dimension::Moment => (lever * force).max(of_loads * bar.scale),
                 Dimension::Work | Dimension::Length | Dimension::Stress => of_loads * bar.scale,
-                Dimension::ContactLength | Dimension::Place => of_loads * bar.scale,
+                Dimension::ContactLength => of_loads * bar.scale,
+                Dimension::Place | Dimension::Given => 0.0,
             };
             bar.bar += match bar.dimension {
                 Dimension::LeastZeta => zeta_min,
@@ -178,9 +180,8 @@ impl DiscreteProblem {
                 // σ = ζ𝒜ε(u).
                 Dimension::Stress => (displacement + zeta) * now,
                 Dimension::Work | Dimension::Length | Dimension::Force => displacement * now,
-                Dimension::Moment | Dimension::ContactLength | Dimension::Place => {
-                    displacement * now
-                }
+                Dimension::Moment | Dimension::ContactLength => displacement * now,
+                Dimension::Place | Dimension::Given => 0.0,
             };
         }
     }
@@ -191,7 +192,7 @@ impl Figures {
     pub(crate) fn sizes(&self, values: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let size = |(figure, value): (&Figure, f64)| match figure.dimension {
             Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 1.0 - value,
-            Dimension::Place => 0.0,
+            Dimension::Place | Dimension::Given => 0.0,
             Dimension::Work | Dimension::Length | Dimension::Force => value.abs(),
             Dimension::Moment | Dimension::Stress | Dimension::ContactLength => value.abs(),
         };
