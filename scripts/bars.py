@@ -8,9 +8,9 @@ ROUNDING = 1e-15
 LEAST_BAR = 1e-6
 
 
-def three_digits(number):
+def plain(number, digits=3):
     """A figure without a bar: 1220, not 1.22e+03."""
-    return f"{float(f'{number:.3g}'):g}"
+    return f"{float(f'{number:.{digits}g}'):.7g}"
 
 
 def barred(value, bar):
@@ -19,7 +19,7 @@ def barred(value, bar):
     if bar is None or bar <= ROUNDING * abs(value):
         return None
     if bar > abs(value) > 0:
-        return f"{value:.2g} ± {bar:.2g}"
+        return f"{plain(value, 2)} ± {plain(bar, 2)}"
     bar = max(bar, LEAST_BAR * abs(value))
     value, bar = Decimal(repr(float(value))), Decimal(repr(float(bar)))
     first = bar.adjusted()

@@ -103,7 +103,7 @@ def damage_map(results, limits, factor=None):
     power = power_of(limits.damage)
     title = f"damage 1 − ζ{times_power(power)}"
     if OPTIONS.titles:
-        title += f", least ζ {results.said('zeta_min', results.zeta.min(), plain=least_zeta)}"
+        title += f", least ζ {results.said('zeta_min', results.zeta.min(), written=least_zeta)}"
     factor = results.factor if factor is None else factor
 
     def paint(axes):

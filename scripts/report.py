@@ -22,7 +22,7 @@ from string import Template
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
 from drawing import FAINT, RED, plt, wrapped
-from bars import barred
+from bars import barred, plain
 from contact_pressure import draw_evolution, draw_pressure
 from figures import FIGURES
 from histories import draw_histories
@@ -133,7 +133,7 @@ def said(figure, value, flagged=True):
         return "–"
     flag, _ = flag_of(figure)
     if flag and flagged:
-        return f"{value:.2g}, {flag}"
+        return f"{plain(value, 2)}, {flag}"
     return value == figure["value"] and barred(value, figure["bar"]) or f"{float(f'{value:.4g}'):g}"
 
 
@@ -326,7 +326,7 @@ def main(prog=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
-    parser.add_argument("--pdf", action="store_true", help="also report.pdf: two pages with values, maps and curves")
+    parser.add_argument("--pdf", action="store_true", help="also report.pdf: two or three pages with values, maps and curves")
     parser.add_argument("--title", help="default: that of the scene")
     parser.add_argument("--author", default="")
     parser.add_argument("--date", default="")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bars import barred, three_digits
+from bars import barred, plain
 from elements import Pieces
 from signorini_results import paths
 from signorini_summaries import flag_of, option_of, units_of
@@ -122,7 +122,7 @@ class Results:
     def stopping_time(self):
         """The time at which the run stopped, as text."""
         time = self.summary["stopped_at"]
-        return barred(time, self.summary.get("stopped_uncertainty")) or three_digits(time)
+        return barred(time, self.summary.get("stopped_uncertainty")) or plain(time)
 
     @property
     def ending(self):
@@ -186,7 +186,7 @@ class Results:
         """Whether this is the last state of the run."""
         return self.time == self.frames[-1][0]
 
-    def said(self, name, value, factor=1.0, plain=three_digits):
+    def said(self, name, value, factor=1.0, written=plain):
         """A figure of this state over `factor` as text, with its error bar if it has one, and with two digits if the mesh
         does not determine it; the `value` of the frame if the history lacks the figure."""
         figure = self.summary.get("figures", {}).get(name) or {}
@@ -195,9 +195,9 @@ class Results:
         elif (column := f"{self.material}.{name}" if self.material else name) in self.history:
             value = self.history[column][self.step]
         if flag_of(figure)[0]:
-            return f"{float(f'{value / factor:.2g}'):g}"
+            return plain(value / factor, 2)
         bar = figure.get("bar") if self.is_last else None
-        return barred(value / factor, bar and bar / abs(factor)) or plain(value / factor)
+        return barred(value / factor, bar and bar / abs(factor)) or written(value / factor)
 
     def singular(self, name="von_mises_max"):
         """What makes an extreme stress of the last state singular; None if nothing does, and at other times."""

@@ -9,7 +9,7 @@ import argparse
 import csv
 import sys
 
-from bars import barred
+from bars import barred, plain
 from signorini_summaries import COLUMNS, FLAGS, flag_of, folders_of, named, rows_of, summary_of, unknown
 
 
@@ -54,7 +54,7 @@ def printed(rows, units, as_csv=False):
         value, bar = row.get(name), row.get(f"{name}.bar")
         text = barred(value, bar) if bar is not None and value is not None else None
         flag, _ = flag_of({flag[1:]: row.get(f"{name}{flag}") for flag in FLAGS})
-        return f"{value:.2g} {flag}" if flag else text or text_of(value)
+        return f"{plain(value, 2)} {flag}" if flag else text or text_of(value)
 
     names = list(dict.fromkeys(name for row in rows for name in row if not name.endswith((".bar", *FLAGS))))
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]

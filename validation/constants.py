@@ -19,8 +19,9 @@ CONSTANT = re.compile(r"((?:^ *///.*\n)*)^ *(?:pub(?:\([a-z:]+\))? )?(?:const|st
 TUNED = re.compile(r"Tuned on (?P<scenes>.+?)\. (?P<lower>\S+?): (?P<less>.+?)\. (?P<upper>\S+?): (?P<more>.+?)\.$")
 HEAD = """# Constants that were tuned
 
-`make constants` makes this page from the comments in `src`, and a test compares both. Every constant was halved and doubled
-(or set to the value that is named), and the scenes were run again. The other constants in `src` follow from theory, from
+`make constants` makes this page from the comments in `src`, and a test compares both. Constants were halved and doubled
+(or set to the value that is named), and their scenes were run again, 31 of them on this state of the code; statements about
+bars that fail are older. The other constants in `src` follow from theory, from
 rounding or from a file format, or only choose when a note appears; their comments say which.
 
 | scenes | runs |

@@ -64,8 +64,8 @@ fn figures_stand_with_units_bars_and_singular_flags() {
     for text in [
         "work (J/m)",
         "5.3570 ± 0.0005",
-        "2.3e+04 singular",
-        "2.9e+02 not resolved",
+        "23000 singular",
+        "290 not resolved",
         "reached",
         " no ",
         "finished",
