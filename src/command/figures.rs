@@ -17,7 +17,7 @@ pub(super) struct LastFigure<'a> {
     pub(super) figure: &'a Figure,
     label: &'a str,
     pub(super) unit: String,
-    /// Null if there is no such place.
+    /// In `summary.json` it is null if there is no such place, as without contact.
     pub(super) value: f64,
     /// The error bar, if the errors were measured and the mesh determines the figure.
     bar: Option<f64>,
@@ -124,12 +124,12 @@ impl<'a> LastFigures<'a> {
         }
     }
 
-    /// What makes the largest von Mises stress singular.
+    /// The reason why an extreme is singular, if it is.
     pub(super) fn singular(&self, name: &str) -> Option<&str> {
         self.get(name)?.singular.as_deref()
     }
 
-    /// A place by the kind of its coordinates without `_x` and `_y`; `None` without one.
+    /// The place with the coordinates `KIND_x` and `KIND_y`; `None` if there is none.
     pub(super) fn place(&self, kind: &str) -> Option<String> {
         let place = ["x", "y"].map(|axis| self.value(&format!("{kind}_{axis}")));
         place[0].is_finite().then(|| self.mesh.place(place))
@@ -147,7 +147,7 @@ impl<'a> LastFigures<'a> {
         };
         self.all.iter().filter(is_asked).filter_map(|of| {
             let governing = of.governing?;
-            // Near 1, a damage is what counts.
+            // Of ζ near 1, the change counts relative to the damage 1 − ζ.
             let [last, most] = match of.figure.dimension.is_damage() {
                 true => [1.0 - of.value, 1.0 - governing.value],
                 false => [of.value, governing.value],

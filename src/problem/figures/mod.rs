@@ -55,7 +55,7 @@ impl Dimension {
         }
     }
 
-    /// Has a figure of it an error bar?
+    /// Do figures of this dimension have error bars?
     pub fn has_bar(self) -> bool {
         !matches!(self, Self::Place | Self::Given)
     }
@@ -90,9 +90,9 @@ pub enum Of {
 /// The value of a figure in a state, and the place at which it is found, m, if it is found at one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Value {
-    /// In the unit of the figure; NaN for a place that there is not.
+    /// In the unit of the figure. It is NaN if there is no such place, as without contact.
     pub value: f64,
-    /// m.
+    /// The place, m.
     pub at: Option<[f64; 2]>,
 }
 
@@ -137,12 +137,13 @@ impl Figure {
         self.kind == "pressure_max"
     }
 
-    /// A value as a size of which the largest one is the extreme: its opposite for a minimum.
+    /// The value, or its opposite if the extreme is a minimum: the extreme has the largest size.
     pub fn size(&self, value: f64) -> f64 {
         if self.governing == Governing::Least { -value } else { value }
     }
 
-    /// Does a value govern a run with the value `other`? There is none before the first step, nor for places.
+    /// Is `value` more extreme than `other`, the extreme of the steps before? Before the first step `other` is `None`. Places have
+    /// no extremes.
     pub fn governs(&self, value: f64, other: Option<f64>) -> bool {
         let Some(other) = other else { return self.dimension != Dimension::Place };
         match self.governing {
@@ -153,7 +154,7 @@ impl Figure {
     }
 }
 
-/// The parts of a scene of which there are figures, by their names.
+/// The names of what has figures of its own in a scene.
 #[derive(Default)]
 pub(crate) struct Parts<'a> {
     /// The materials, if there are several.
@@ -291,8 +292,8 @@ impl Figures {
         })
     }
 
-    /// Adds figures, each with its kind, its label with an @ for the name, its dimension, and what governs. `value` gives that of
-    /// the k-th.
+    /// Adds several figures of one part. Each has a kind, a label in which @ stands for the name of the part, a dimension, and which
+    /// value of a run governs. `value` returns the value of the figure with the number k among them.
     fn add<const N: usize>(
         &mut self,
         of: &Of,
@@ -329,7 +330,8 @@ impl Figures {
         self.0.iter().map(|figure| (figure.value)(of)).collect()
     }
 
-    /// The extremes of the parts of the body or of Γ_C, if `number` is the same extreme of the whole and there are parts.
+    /// The numbers of the figures that describe parts (materials or foundations), if the figure `number` describes the whole in
+    /// the same way.
     pub(crate) fn parts(&self, number: usize) -> impl Iterator<Item = usize> {
         let whole = &self[number];
         let is_part =

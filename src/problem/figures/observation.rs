@@ -6,11 +6,11 @@ use crate::{
     problem::{ContactFigures, ContactRow, DiscreteProblem, MeanDisplacement, State, rows_of},
 };
 
-/// What the figures of a state are read from: the state, which is that of this rank, and sums that are the same on all ranks.
+/// The quantities from which figures take their values. The state is that of this rank; all other quantities are sums or extremes
+/// over the ranks.
 pub(crate) struct Observation<'a> {
-    /// See `state`.
     pub problem: &'a DiscreteProblem,
-    /// A figure that is read from these two must be collective.
+    /// A figure that is computed from the state must add up the ranks.
     pub state: &'a State,
     /// min ζ.
     pub zeta_min: Value,
