@@ -223,7 +223,7 @@ def main(prog=None):
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help=(
         "runs at once (default: the cores that this process may use)"))
     parser.add_argument("--frames", action="store_true", help="with frames, as `run` writes them")
-    parser.add_argument("--columns", type=names_of, default=COLUMNS, metavar=(
+    parser.add_argument("--columns", type=names_of, action="extend", metavar=(
         "NAME,…"), help="of the table, as for `signorini table`")
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
@@ -242,7 +242,7 @@ def main(prog=None):
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
     failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs)
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
-    rows, units = rows_of(folders, summaries, arguments.columns, list(map(dict, chosen)))
+    rows, units = rows_of(folders, summaries, arguments.columns or COLUMNS, list(map(dict, chosen)))
     printed(rows, units)
     write_table(rows, out / "study.csv", units)
     print(out / "study.csv")

@@ -66,7 +66,7 @@ def printed(rows, units, as_csv=False):
 
 def refused(columns, summaries):
     """Prints unknown columns; returns whether there are any."""
-    problems = [] if columns is COLUMNS else list(unknown(columns, summaries))
+    problems = list(unknown(columns or [], summaries))
     print(*(f"error: {problem}\n" for problem in problems), sep="", end="", file=sys.stderr)
     return bool(problems)
 
@@ -76,7 +76,7 @@ def main(prog=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="folders of results")
-    parser.add_argument("--columns", type=names_of, default=COLUMNS, metavar="NAME,…", help=(
+    parser.add_argument("--columns", type=names_of, action="extend", metavar="NAME,…", help=(
         "figures, also NAME.governing and NAME.governing.time of the whole run, and entries of summary.json: errors.solver; "
         "a name with a comma stands in double quotes"))
     parser.add_argument("--csv", action="store_true", help="as CSV with all digits; error bars are columns NAME.bar")
@@ -89,7 +89,7 @@ def main(prog=None):
             print(f"error: {error}", file=sys.stderr)
             failed = True
     if found:
-        printed(*rows_of(found, found.values(), arguments.columns), arguments.csv)
+        printed(*rows_of(found, found.values(), arguments.columns or COLUMNS), arguments.csv)
         failed |= refused(arguments.columns, found.values())
     return 2 if failed else 0
 
