@@ -150,8 +150,8 @@ fn a_body_without_damage_is_not_told_of_damage() {
     assert!(!directory.names("out/scene").iter().any(|name| name == "stress.gif"));
 }
 
-/// A block, `WIDTH` by `HEIGHT`, on `PIERS` piers.
-const PIERS: &str = r#"DefineConstant[ width = 6, height = 1, piers = 1, size = 0.25 ];
+/// A block of some layers on some piers.
+const PIERS: &str = r#"DefineConstant[ width = 6, height = 1, piers = 1, layers = 1, size = 0.25 ];
 n = 2*piers - 1;
 For k In {0:n}
   Point(k + 1) = {width*k/n, 0, 0, size};
@@ -159,24 +159,30 @@ EndFor
 For k In {1:n}
   Line(k) = {k, k + 1};
 EndFor
-Point(101) = {width, height, 0, size};
-Point(102) = {0, height, 0, size};
-Line(101) = {n + 1, 101};
-Line(102) = {101, 102};
-Line(103) = {102, 1};
-Curve Loop(1) = {1:n, 101, 102, 103};
-Plane Surface(1) = {1};
+For k In {1:layers}
+  Point(200 + 2*k) = {0, height*k/layers, 0, size};
+  Point(201 + 2*k) = {width, height*k/layers, 0, size};
+  Line(300 + k) = {201 + 2*k, 200 + 2*k};
+  Line(400 + k) = {200 + 2*k, k == 1 ? 1 : 198 + 2*k};
+  Line(500 + k) = {k == 1 ? n + 1 : 199 + 2*k, 201 + 2*k};
+  If (k == 1)
+    Curve Loop(k) = {1:n, 501, 301, 401};
+  Else
+    Curve Loop(k) = {-(299 + k), 500 + k, 300 + k, 400 + k};
+  EndIf
+  Plane Surface(k) = {k};
+  Physical Surface(Sprintf("layer%g", k)) = {k};
+EndFor
 For k In {1:piers}
   Physical Curve(Sprintf("pier%g", k)) = {2*k - 1};
 EndFor
-Physical Curve("top") = {102};
-Physical Curve("left") = {103};
-Physical Surface("body") = {1};
+Physical Curve("top") = {300 + layers};
+Physical Curve("left") = {401:400 + layers};
 "#;
 
-/// Runs blocks from 1:6 to 6:1: a static one, one that breaks on ten piers, one that lifts off, and one with a load that
-/// comes and goes. Returns their folders.
-fn blocks(directory: &TestDirectory) -> [&'static str; 4] {
+/// Runs blocks from 1:6 to 6:1: a static one, one that breaks on ten piers, one that lifts off, one with a load that
+/// comes and goes, and one of three materials. Returns their folders.
+fn blocks(directory: &TestDirectory) -> [&'static str; 5] {
     directory.write("piers.geo", PIERS);
     let damage =
         "[damage]\ndiffusion = 0.1\nlambda_d = 0.1\nlambda_u = 1e9\n[time]\nend = 1\nstep = 0.1\n";
@@ -185,20 +191,27 @@ fn blocks(directory: &TestDirectory) -> [&'static str; 4] {
         ("broken", (12, 2, 10), damage, "-4e6*t*x"),
         ("lifted", (5, 2, 1), damage, "1e5*(t - 0.5)"),
         ("pulsing", (6, 1, 1), damage, "-4e5*sin(4*t)*x"),
+        (
+            "layered",
+            (4, 3, 2),
+            "[material.layer2]\nyoung = 5e9\n[material.layer3]\nyoung = 90e9\n",
+            "-4e5*x",
+        ),
     ];
-    for (name, (width, height, piers), damage, load) in cases {
+    for (name, (width, height, piers), model, load) in cases {
+        let layers = 1 + model.matches("[material.").count();
         let supports: String =
             (1..=piers).map(|k| format!("[[boundary]]\nname = \"pier{k}\"\ngap = 0\n")).collect();
         let scene = format!(
             "title = \"A block that is {name}\"\n[mesh]\nfile = \"piers.geo\"\n[mesh.parameters]\nwidth = {width}\n\
-             height = {height}\npiers = {piers}\n[material]\nyoung = 30e9\npoisson = 0.2\nplane = \"strain\"\n\
-             {damage}{supports}[[boundary]]\nname = \"left\"\nsymmetry = true\n\
+             height = {height}\npiers = {piers}\nlayers = {layers}\n[material]\nyoung = 30e9\npoisson = 0.2\nplane = \"strain\"\n\
+             {model}{supports}[[boundary]]\nname = \"left\"\nsymmetry = true\n\
              [[boundary]]\nname = \"top\"\ntraction = [0, \"{load}\"]\n[[probe]]\nname = \"inside\"\npoint = [0.5, 0.5]\n"
         );
         directory.write(&format!("{name}.toml"), &scene);
         assert_eq!(directory.say(&["run", &format!("{name}.toml")]).code, Some(0), "{name}");
     }
-    ["out/tall", "out/broken", "out/lifted", "out/pulsing"]
+    ["out/tall", "out/broken", "out/lifted", "out/pulsing", "out/layered"]
 }
 
 /// What a program beside this file prints, which gets the `folders`.

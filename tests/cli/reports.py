@@ -74,7 +74,7 @@ for folder in map(Path, sys.argv[1:]):
                 for title, cell in zip(head[1:], cells):
                     title = re.sub(r" \([^()]*\)$", "", title)
                     own = [of for key, of in figures.items() if key.rpartition(".")[0] == name and re.sub(
-                        rf" (of|at|in) {name}\b|, [xy]$", "", of["label"]) == title]
+                        rf" (of|at|in) ({name}\b|the rest of the body)|, [xy]$", "", of["label"]) == title]
                     if cell and "–" not in cell:
                         expected = [of["value"] if label == name else of["governing"]["value"] for of in own]
                         count += compared(f"{folder} {name} {title}", cell, expected)
