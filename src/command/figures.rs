@@ -147,11 +147,7 @@ impl<'a> LastFigures<'a> {
         };
         self.all.iter().filter(is_asked).filter_map(|of| {
             let governing = of.governing?;
-            // Of ζ near 1, the change counts relative to the damage 1 − ζ.
-            let [last, most] = match of.figure.dimension.is_damage() {
-                true => [1.0 - of.value, 1.0 - governing.value],
-                false => [of.value, governing.value],
-            };
+            let scale = [of.value, governing.value].map(|value| of.figure.magnitude(value));
             // The reason why the mesh does not determine the last value holds at its place.
             let (digits, reason) = match of.figure.is_extreme() && governing.at == of.at {
                 true if !of.reason().is_empty() => (2, of.reason()),
@@ -161,7 +157,8 @@ impl<'a> LastFigures<'a> {
                 let value = format!("{} {}", plain(governing.value, digits), of.unit);
                 format!("{}{reason}", value.trim_end())
             };
-            let differs = (most - last).abs() > DIFFERENT * most.abs().max(last.abs());
+            let change = (governing.value - of.value).abs();
+            let differs = change > DIFFERENT * scale[0].max(scale[1]);
             differs.then(|| (of.label, value(), governing.time))
         })
     }

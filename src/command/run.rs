@@ -275,7 +275,7 @@ fn solve_once<'a>(
     let mut result =
         estimate::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
     if let Ok(outcome) = &mut result {
-        outcome.set_bars(problem, &task.measured);
+        outcome.set_bars(problem, &task.measured)?;
     }
     Ok((recorder, result))
 }

@@ -14,21 +14,9 @@ impl ErrorBudget {
         steps: Option<[DVector<f64>; 2]>,
     ) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
-        let (body, zeta) = (&problem.body, DVector::from_column_slice(&state.zeta));
         let caused = |error: &[f64]| displacement_error_of(problem, error, state);
-        let min_max = |field: &[f64]| body.vertices.partition.min_max(field);
         let error = steps.as_ref().map(|[error, _]| error.as_slice());
-        let bars = |[error, bar]: &[DVector<f64>; 2]| {
-            // The true minimum lies between the minima of ζ − bar and of ζ + bar.
-            let [low, min, high] =
-                [&zeta - bar, zeta.clone(), &zeta + bar].map(|zeta| min_max(zeta.as_slice()).0);
-            let doubt = bar - error.abs();
-            let mean = body.mean(error.as_slice()).abs() + body.mean(doubt.as_slice());
-            let of_zeta = [min_max(bar.as_slice()).1, (min - low).max(high - min), mean];
-            // 0 < ζ ≤ 1 bounds every error of ζ.
-            let [most, min, mean] = of_zeta.map(|bar| bar.min(1.0));
-            [most, min, mean, caused(bar.as_slice())]
-        };
+        let bars = |[_, bar]: &[DVector<f64>; 2]| (bar.clone(), caused(bar.as_slice()));
         Self {
             displacement_mesh: accuracy.energy,
             damage_mesh: None,

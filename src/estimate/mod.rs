@@ -34,6 +34,7 @@ use crate::{
     petsc::{PetscError, Session},
     problem::{Bar, DiscreteProblem},
 };
+use nalgebra::DVector;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
@@ -100,21 +101,30 @@ impl Outcome {
     /// Sets the error bars: the `measured` errors of the mesh plus the errors of the time steps. A run that stopped at
     /// ζ_* has the bar of this time alone, because another mesh stops at another time. There are none if the run has too
     /// few steps for an estimate. Collective.
-    pub fn set_bars(&mut self, problem: &DiscreteProblem, measured: &Measured) {
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn set_bars(
+        &mut self,
+        problem: &DiscreteProblem,
+        measured: &Measured,
+    ) -> Result<(), PetscError> {
         let unknown = problem.damage().is_some() && self.errors.bars_of_steps.is_none();
         if let Some(stop) = &mut self.stopped {
             stop.from_mesh = measured.stop;
-            return;
+            return Ok(());
         }
         self.errors.damage_mesh = measured.damage;
         if unknown || measured.bars.is_empty() {
-            return;
+            return Ok(());
         }
         self.bars = measured.bars.clone();
         let now = self.set_scales(problem, measured);
-        let of_steps = self.errors.bars_of_steps.unwrap_or_default();
-        problem.add_step_errors(&mut self.bars, &now, of_steps);
+        let none = (DVector::zeros(self.last.state.zeta.len()), 0.0);
+        let of_steps = self.errors.bars_of_steps.as_ref().unwrap_or(&none);
+        problem.add_step_errors(&mut self.bars, &now, &self.last.state, of_steps)?;
         problem.join_bars(&mut self.bars, &self.last.figures);
+        Ok(())
     }
 
     /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end
@@ -128,7 +138,7 @@ impl Outcome {
         };
         let largest = scales(&self.sizes(problem), self.last.forces);
         let last = self.last.figures.iter().map(|of| of.value);
-        let now = scales(&problem.figures.sizes(last), 0.0);
+        let now = scales(&problem.figures.magnitudes(last), 0.0);
         for (bar, scale) in self.bars.iter_mut().zip(largest) {
             if scale > bar.scale && bar.scale > 0.0 {
                 bar.bar *= scale / bar.scale;

@@ -1,6 +1,7 @@
 //! The error budget of a run: the errors of the mesh, the time steps and the solver.
 
 use super::Stop;
+use nalgebra::DVector;
 use serde::Serialize;
 
 /// Estimated relative errors of the last accepted state: for u in the energy norm, and for the damage ζ₀ − ζ in L².
@@ -21,10 +22,9 @@ pub struct ErrorBudget {
     /// Can the material be damaged?
     #[serde(skip)]
     pub can_be_damaged: bool,
-    /// The error bars from the time steps: the largest of ζ at a node, of min ζ, of mean ζ, and of u, relative, in the
-    /// energy norm.
+    /// The error bars from the time steps: of ζ at the vertices, and of u, relative, in the energy norm.
     #[serde(skip)]
-    pub(crate) bars_of_steps: Option<[f64; 4]>,
+    pub(crate) bars_of_steps: Option<(DVector<f64>, f64)>,
 }
 
 /// If all errors are below this, there is no advice.

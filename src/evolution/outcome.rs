@@ -96,7 +96,7 @@ impl Outcome {
     /// The sizes of all figures in the run, from which their scales come.
     pub(crate) fn sizes(&self, problem: &DiscreteProblem) -> Vec<f64> {
         let governing = self.last.governing.iter();
-        problem.figures.sizes(governing.map(|of| of.map_or(0.0, |of| of.value)))
+        problem.figures.magnitudes(governing.map(|of| of.map_or(0.0, |of| of.value)))
     }
 
     pub(super) fn accept(&mut self, mut step: Step, problem: &DiscreteProblem) {

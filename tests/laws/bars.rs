@@ -147,7 +147,7 @@ fn a_force_that_statics_determines_is_off_by_no_more_than_its_bar_wherever_a_loa
             let session = Session::start(&[]).unwrap();
             let measured =
                 estimate::measured_errors(&session, &scene, &square(3), SOLVERS[0], None).unwrap();
-            outcome.set_bars(&problem, &measured);
+            outcome.set_bars(&problem, &measured).expect("PETSc works");
             let error =
                 (crate::support::figures(&problem, &outcome.last)["bottom.force_y"] - force).abs();
             let bar = bar(&outcome.bars, "bottom.force_y");
@@ -176,7 +176,7 @@ fn a_foundation_that_comes_from_far_away_leaves_the_bars_as_they_are() {
         let session = Session::start(&[]).unwrap();
         let measured =
             estimate::measured_errors(&session, &scene, &square(4), SOLVERS[0], None).unwrap();
-        outcome.set_bars(&problem, &measured);
+        outcome.set_bars(&problem, &measured).expect("PETSc works");
         let travel = crate::support::figures(&problem, &outcome.last)["bottom.travel"];
         assert!((travel - far - 0.01).abs() < 1e-12, "{travel}");
         assert!(outcome.bars.iter().all(|bar| bar.name != "bottom.travel"));

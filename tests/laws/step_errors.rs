@@ -118,7 +118,7 @@ fn with_bars(problem: &DiscreteProblem) -> (Outcome, Vec<f64>) {
         estimate::measured_errors(&session, problem.scene(), &mesh, SOLVERS[0], None).unwrap();
     drop(session);
     let (steps, mut outcome) = history(problem, SOLVERS[0]);
-    outcome.set_bars(problem, &measured);
+    outcome.set_bars(problem, &measured).expect("PETSc works");
     (outcome, steps.iter().map(|step| step.record.displacement_max).collect())
 }
 

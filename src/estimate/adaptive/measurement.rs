@@ -280,12 +280,12 @@ impl Measurement {
         let at = of_extreme.or_else(|| self.probes.iter().find(at_probe).map(|probe| probe.1));
         match (bar.dimension, at) {
             (Dimension::ContactLength, _) => Cause::Ends,
-            (Dimension::Zeta | Dimension::LeastZeta, _) => Cause::Change(self.zeta.clone()),
+            (Dimension::Zeta, _) => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
             (Dimension::Length, Some(at)) => Cause::Around(at, 0),
             (Dimension::Stress, Some(at)) => Cause::Around(at, 1),
             (Dimension::Length | Dimension::Stress, None) => Cause::FIGURE,
-            (Dimension::Work | Dimension::MeanZeta, _) => Cause::FIGURE,
+            (Dimension::Work | Dimension::OfZeta, _) => Cause::FIGURE,
             (Dimension::Place | Dimension::Given, _) => Cause::FIGURE,
         }
     }

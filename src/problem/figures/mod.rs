@@ -28,10 +28,8 @@ pub enum Dimension {
     Moment,
     /// ζ at a point.
     Zeta,
-    /// min ζ over the body.
-    LeastZeta,
-    /// Mean ζ of the body.
-    MeanZeta,
+    /// A number from 0 to 1 that follows from ζ in the whole body, as its mean.
+    OfZeta,
     /// A stress, or the contact pressure, Pa.
     Stress,
     /// m, along Γ_C.
@@ -50,7 +48,7 @@ impl Dimension {
             Self::Length | Self::ContactLength | Self::Place | Self::Given => units.length.clone(),
             Self::Force => format!("{}/{}", units.force, units.length),
             Self::Moment => units.force.clone(),
-            Self::Zeta | Self::LeastZeta | Self::MeanZeta => String::new(),
+            Self::Zeta | Self::OfZeta => String::new(),
             Self::Stress => units.stress.clone(),
         }
     }
@@ -62,7 +60,7 @@ impl Dimension {
 
     /// Is it a value of ζ?
     pub fn is_damage(self) -> bool {
-        matches!(self, Self::Zeta | Self::LeastZeta | Self::MeanZeta)
+        matches!(self, Self::Zeta | Self::OfZeta)
     }
 }
 
@@ -195,13 +193,12 @@ impl Figures {
     /// The list of all figures.
     pub(crate) fn new(parts: &Parts) -> Self {
         use Dimension::{
-            ContactLength, Force, Given, LeastZeta, Length, MeanZeta, Moment, Place, Stress, Work,
-            Zeta,
+            ContactLength, Force, Given, Length, Moment, OfZeta, Place, Stress, Work, Zeta,
         };
         use Governing::{Largest, LargestModulus, Least};
         let (mut all, body) = (Self::default(), Of::Body);
-        all.add(&body, [("zeta_min", "least ζ", LeastZeta, Least)], |of, _| of.zeta_min);
-        all.add(&body, [("zeta_mean", "mean ζ", MeanZeta, Least)], |of, _| {
+        all.add(&body, [("zeta_min", "least ζ", Zeta, Least)], |of, _| of.zeta_min);
+        all.add(&body, [("zeta_mean", "mean ζ", OfZeta, Least)], |of, _| {
             of.problem.body.mean(&of.state.zeta).into()
         });
         let most = ("displacement_max", "largest displacement", Length, Largest);

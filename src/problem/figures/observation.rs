@@ -58,7 +58,7 @@ impl<'a> Observation<'a> {
     ///
     /// # Errors
     /// PETSc failed.
-    fn new(
+    pub(super) fn new(
         problem: &'a DiscreteProblem,
         state: &'a State,
         load: &[f64],

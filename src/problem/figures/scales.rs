@@ -1,7 +1,11 @@
 //! The error bars of figures, and the scales of their relative errors.
 
-use super::{Dimension, Figure, Figures, Of, Value};
-use crate::problem::{DiscreteProblem, SAMPLE_TIMES};
+use super::{Dimension, Figure, Figures, Governing, Observation, Of, Value};
+use crate::{
+    petsc::PetscError,
+    problem::{DiscreteProblem, SAMPLE_TIMES, State},
+};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -87,7 +91,7 @@ impl DiscreteProblem {
     }
 
     /// The scale of each figure: the maximum of its group in a run, and at least a part of its natural scale. From the
-    /// `largest` [sizes](Figures::sizes), ‖u‖² (`energy`, N m per metre of thickness) and Σ|f| (`forces`, N per metre of thickness)
+    /// `largest` [magnitudes](Figures::magnitudes), ‖u‖² (`energy`, N m per metre of thickness) and Σ|f| (`forces`, N per metre of thickness)
     /// of the run. All forces may balance, as in pure bending; their sum of moduli does not vanish.
     /// An extreme that the meshes leave `unsettled` is no scale of the others.
     pub(crate) fn figure_scales(
@@ -117,7 +121,7 @@ impl DiscreteProblem {
                     let resultant = most(&|other| other.dimension == Dimension::Force);
                     lever * (MIN_PART * resultant).max(MIN_SCALE * forces)
                 }
-                Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => NEGLIGIBLE_DAMAGE,
+                Dimension::Zeta | Dimension::OfZeta => NEGLIGIBLE_DAMAGE,
                 Dimension::Stress => MIN_PART * mean_stress,
                 // A sum of lengths of edges has no rounding.
                 Dimension::ContactLength | Dimension::Place | Dimension::Given => 0.0,
@@ -144,7 +148,7 @@ impl DiscreteProblem {
                 Dimension::Stress => force / lever,
                 Dimension::Work | Dimension::ContactLength => 0.0,
                 Dimension::Place | Dimension::Given => 0.0,
-                Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 0.0,
+                Dimension::Zeta | Dimension::OfZeta => 0.0,
             };
             // No -0.
             *value = if value.abs() <= rounding { 0.0 } else { *value + 0.0 };
@@ -152,21 +156,52 @@ impl DiscreteProblem {
         values
     }
 
+    /// The most by which each figure changes if ζ changes by up to `bar` and u does not. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    fn changes(&self, state: &State, bar: &DVector<f64>) -> Result<Vec<f64>, PetscError> {
+        let values = |sign: f64| {
+            let zeta = state.zeta.iter().zip(bar).map(|(zeta, bar)| zeta + sign * bar);
+            let (state, zero) =
+                (State { zeta: zeta.collect(), ..state.clone() }, vec![0.0; state.u.len()]);
+            Ok(self.figures.values(&Observation::new(self, &state, &zero, &zero)?))
+        };
+        let [low, own, high] = [values(-1.0)?, values(0.0)?, values(1.0)?];
+        let all = low.iter().zip(&own).zip(&high);
+        let most = |((a, b), c): ((&Value, &Value), &Value)| {
+            (b.value - a.value).abs().max((c.value - b.value).abs())
+        };
+        Ok(all.map(most).collect())
+    }
+
     /// Adds to the error bars the solver's tolerance and the errors of the loads' integrals, which all meshes
-    /// of a measurement may have, and of the time steps.
+    /// of a measurement may have, and of the time steps: `of_steps` are the error bars of ζ at the vertices in the last
+    /// `state`, and of u, relative, in the energy norm. Collective.
     ///
     /// u depends on the past, and so on the steps, only through ζ: their errors are relative to the scales `now`, in the last
     /// state.
-    pub(crate) fn add_step_errors(&self, bars: &mut [Bar], now: &[f64], of_steps: [f64; 4]) {
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(crate) fn add_step_errors(
+        &self,
+        bars: &mut [Bar],
+        now: &[f64],
+        state: &State,
+        (bar, displacement): &(DVector<f64>, f64),
+    ) -> Result<(), PetscError> {
         let [force, of_loads] =
             self.loads.integral_errors(&self.body, &self.scene().sample_times(SAMPLE_TIMES));
         let lever =
             self.body.radius_of_gyration() + self.body.centroid[0].hypot(self.body.centroid[1]);
-        let [zeta, zeta_min, zeta_mean, displacement] = of_steps;
+        let changes = self.changes(state, bar)?;
+        let zeta = self.body.vertices.partition.min_max(bar.as_slice()).1.min(1.0);
         for (bar, now) in bars.iter_mut().zip(now) {
+            let Some(number) = self.figures.number(&bar.name) else { continue };
             bar.bar += self.tolerance * bar.scale;
             bar.bar += match bar.dimension {
-                Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 0.0,
+                Dimension::Zeta | Dimension::OfZeta => 0.0,
                 Dimension::Force => force.max(of_loads * bar.scale),
                 Dimension::Moment => (lever * force).max(of_loads * bar.scale),
                 Dimension::Work | Dimension::Length | Dimension::Stress => of_loads * bar.scale,
@@ -174,28 +209,39 @@ impl DiscreteProblem {
                 Dimension::Place | Dimension::Given => 0.0,
             };
             bar.bar += match bar.dimension {
-                Dimension::LeastZeta => zeta_min,
-                Dimension::MeanZeta => zeta_mean,
-                Dimension::Zeta => zeta,
+                Dimension::Zeta if self.figures[number].of != Of::Body => zeta,
+                Dimension::Zeta | Dimension::OfZeta => changes[number],
                 // σ = ζ𝒜ε(u).
                 Dimension::Stress => (displacement + zeta) * now,
                 Dimension::Work | Dimension::Length | Dimension::Force => displacement * now,
                 Dimension::Moment | Dimension::ContactLength => displacement * now,
                 Dimension::Place | Dimension::Given => 0.0,
             };
+            // 0 < ζ ≤ 1 bounds every error of ζ.
+            bar.bar = bar.bar.min(if bar.dimension.is_damage() { 1.0 } else { f64::INFINITY });
+        }
+        Ok(())
+    }
+}
+
+impl Figure {
+    /// The size of a value, from which scales come: |value|, and 1 − ζ for a least or mean ζ.
+    pub fn magnitude(&self, value: f64) -> f64 {
+        match self.dimension {
+            Dimension::Zeta | Dimension::OfZeta if self.governing == Governing::Least => {
+                1.0 - value
+            }
+            Dimension::Place | Dimension::Given => 0.0,
+            Dimension::Zeta | Dimension::OfZeta => value,
+            Dimension::Work | Dimension::Length | Dimension::Force => value.abs(),
+            Dimension::Moment | Dimension::Stress | Dimension::ContactLength => value.abs(),
         }
     }
 }
 
 impl Figures {
-    /// The sizes of all figures, from which their scales come: |value|, and 1 − ζ for a damage.
-    pub(crate) fn sizes(&self, values: impl IntoIterator<Item = f64>) -> Vec<f64> {
-        let size = |(figure, value): (&Figure, f64)| match figure.dimension {
-            Dimension::Zeta | Dimension::LeastZeta | Dimension::MeanZeta => 1.0 - value,
-            Dimension::Place | Dimension::Given => 0.0,
-            Dimension::Work | Dimension::Length | Dimension::Force => value.abs(),
-            Dimension::Moment | Dimension::Stress | Dimension::ContactLength => value.abs(),
-        };
-        self.iter().zip(values).map(size).collect()
+    /// The magnitudes of all figures.
+    pub(crate) fn magnitudes(&self, values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+        self.iter().zip(values).map(|(figure, value)| figure.magnitude(value)).collect()
     }
 }
