@@ -18,6 +18,8 @@ PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-co
     python3-meshio python3-matplotlib
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
+# dpkg-shlibdeps finds the packages of the libraries.
+PACKAGES_DEB := dpkg-dev
 
 BINARY := target/release/signorini
 # The studies: a program of their own in validation/study.
@@ -27,7 +29,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate deps-random build mesh run figures keys test validate random compare \
+.PHONY: help deps deps-validate deps-random build deb mesh run figures keys test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook \
     constants architecture fuzz clean
 
@@ -36,6 +38,7 @@ help:
 	@echo
 	@echo 'make deps       install the Debian packages that are missing'
 	@echo 'make build      $(BINARY) and $(notdir $(STUDIES))'
+	@echo 'make deb        a Debian package for this release of Debian, in target/debian'
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make figures    the figures of every run in out/, again; or ARGS="--animate --format svg"'
@@ -71,6 +74,13 @@ deps-random: deps
 build: deps
 	cargo fetch --locked --target $$(rustc -vV | sed -n 's/^host: //p')
 	cargo build --release --locked
+
+deb: build
+	@scripts/deps.sh $(PACKAGES_DEB)
+	@command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
+	scripts/package.sh $(BINARY) target/package
+	cargo deb --locked --no-build
+	@ls -sh target/debian/*.deb
 
 mesh: build
 	$(BINARY) mesh $(SCENE)

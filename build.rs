@@ -4,7 +4,7 @@ use std::{env, path::PathBuf, process::Command};
 
 /// Everything the `petsc` module calls. A name that is not here does not exist for us.
 const PETSC: &str = "\
-    PetscInitialize|PetscInitialized|PetscFinalize|PetscPushErrorHandler|\
+    PetscInitialize|PetscInitialized|PetscGetVersionNumber|PetscFinalize|PetscPushErrorHandler|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Bcast|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\

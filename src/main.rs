@@ -11,6 +11,7 @@ use std::{path::PathBuf, process::ExitCode};
 #[derive(Parser)]
 #[command(
     version,
+    long_version = command::version(),
     about,
     after_help = "Scenes are TOML files beside a gmsh geometry: `signorini keys` describes every key, \
     `signorini new NAME` writes a first scene, geo/TUTORIAL.md goes on from there.\n\
@@ -63,6 +64,12 @@ enum Command {
         /// The shell.
         shell: clap_complete::Shell,
     },
+    /// Write the manual pages into a folder, one per subcommand.
+    #[command(hide = true)]
+    Man {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// Mesh the .geo files of scenes with gmsh, unless this was done before.
     Mesh {
         /// Scene files.
@@ -91,6 +98,7 @@ fn main() -> ExitCode {
         Command::Solvers => command::solvers(),
         Command::Keys { schema, figures } => command::keys(schema, figures),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),
+        Command::Man { folder } => command::man(&folder, Arguments::command()),
         Command::Mesh { scenes, set } => command::mesh(&scenes, &set),
     };
     match result {

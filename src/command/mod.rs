@@ -23,6 +23,7 @@ mod task;
 
 pub use check::check;
 pub use new::new;
+pub use provenance::version;
 pub use run::{RunArguments, run};
 pub use script::{ScriptArguments, script};
 
@@ -40,7 +41,7 @@ use signorini::{
 use std::{
     fmt,
     io::{self, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 /// The failure of a command.
@@ -248,6 +249,11 @@ pub fn completions(shell: clap_complete::Shell, mut program: clap::Command) -> R
     clap_complete::generate(shell, &mut program, "signorini", &mut script);
     say(String::from_utf8_lossy(&script).trim_end());
     Ok(())
+}
+
+/// `signorini man FOLDER`. The pages show the short version: the long one tells the files of one machine.
+pub fn man(folder: &Path, program: clap::Command) -> Result<(), Failure> {
+    clap_mangen::generate_to(program.long_version(None::<&str>), folder).map_err(Failure::from)
 }
 
 /// `signorini mesh SCENE…`.

@@ -1,6 +1,7 @@
 //! The origin of a result: program, date, machine and command line.
 
 use serde_json::{Value, json};
+use signorini::petsc;
 use std::{env, fs, thread, time::SystemTime};
 
 /// `provenance` of `summary.json` of a run whose mesh this version of gmsh made. Unknown values are null.
@@ -9,8 +10,7 @@ pub fn provenance(gmsh: Option<&str>) -> Value {
     let arguments = env::args_os().map(|word| word.to_string_lossy().into_owned());
     json!({
         "version": env!("CARGO_PKG_VERSION"),
-        // The commit that `make build` found in a git checkout (git describe).
-        "commit": option_env!("SIGNORINI_COMMIT").filter(|commit| !commit.is_empty()),
+        "commit": commit(),
         // The end of the run, UTC.
         "date": now.to_string(),
         // The words of the command line, and the folder in which it was run.
@@ -26,17 +26,38 @@ pub fn provenance(gmsh: Option<&str>) -> Value {
     })
 }
 
-/// The files of PETSc, of its factors and of BLAS that this process has loaded, from Linux (proc(5), maps). Their
-/// names end with their versions.
+/// The commit that `make build` found in a git checkout (git describe).
+fn commit() -> Option<&'static str> {
+    option_env!("SIGNORINI_COMMIT").filter(|commit| !commit.is_empty())
+}
+
+/// The version of the program, its commit, and PETSc's version and file. They stay for the life of the process, as clap wants.
+pub fn version() -> &'static str {
+    let commit = commit().unwrap_or("not recorded: it was built without make");
+    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| "linked into the program".into());
+    let [version, of_petsc] = [env!("CARGO_PKG_VERSION"), &petsc::version()];
+    format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}").leak()
+}
+
+/// The names of the files of PETSc, of its factors and of BLAS; they end with their versions.
 fn libraries() -> Vec<String> {
-    const LIBRARIES: [&str; 5] = ["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"];
+    let files = loaded(&["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"]);
+    let names = files.iter().filter_map(|file| file.rsplit('/').next());
+    names.map(str::to_owned).collect()
+}
+
+/// The files of these libraries that this process has loaded, from Linux (proc(5), maps).
+fn loaded(libraries: &[&str]) -> Vec<String> {
     let maps = fs::read_to_string("/proc/self/maps").unwrap_or_default();
-    let files = maps.lines().filter_map(|line| line.rsplit_once('/').map(|(_, file)| file));
-    let mut files: Vec<_> =
-        files.filter(|file| LIBRARIES.iter().any(|name| file.starts_with(name))).collect();
+    let files = maps.lines().filter_map(|line| Some(&line[line.find('/')?..]));
+    let is_asked = |file: &&str| {
+        let name = file.rsplit('/').next().unwrap_or_default();
+        libraries.iter().any(|library| name.starts_with(library))
+    };
+    let mut files: Vec<_> = files.filter(is_asked).map(str::to_owned).collect();
     files.sort_unstable();
     files.dedup();
-    files.into_iter().map(str::to_owned).collect()
+    files
 }
 
 /// The name of the processor from Linux (proc(5), cpuinfo).

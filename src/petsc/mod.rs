@@ -34,7 +34,7 @@ mod raw {
 pub use communicator::Communicator;
 pub use error::PetscError;
 pub use matrix::{Matrix, Pattern};
-pub use session::Session;
+pub use session::{Session, version};
 pub use vector::Vector;
 
 pub(crate) use ghosts::Ghosts;

@@ -122,6 +122,14 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     shell_preconditioner::register()
 }
 
+/// PETSc's version, as 3.18.5.
+pub fn version() -> String {
+    let [mut major, mut minor, mut patch, mut release] = [0; 4];
+    // SAFETY: writes four numbers; it may be called before PETSc starts.
+    unsafe { raw::PetscGetVersionNumber(&mut major, &mut minor, &mut patch, &mut release) };
+    format!("{major}.{minor}.{patch}")
+}
+
 /// `PETSC_COMM_WORLD`.
 pub(super) fn world() -> raw::MPI_Comm {
     // SAFETY: written once by PetscInitialize, read-only afterwards.

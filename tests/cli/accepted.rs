@@ -3,7 +3,7 @@
 use crate::test_directory::{ProgramOutput, TestDirectory, sets, square};
 use serde_json::Value;
 use signorini::contact::SOLVERS;
-use std::process::Stdio;
+use std::{fs, process::Stdio};
 
 /// The keys of `summary.json`, which scripts of users read.
 const KEYS: &str = "provenance scene title solver ranks nodes triangles contact_nodes steps end_time active_nodes \
@@ -222,6 +222,26 @@ fn shells_complete_commands_and_options() {
         assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{shell}");
         assert!(["compare", "accuracy"].iter().all(|word| said.out.contains(word)), "{shell}");
     }
+}
+
+#[test]
+fn every_command_of_the_help_has_a_manual_page() {
+    let test_directory = TestDirectory::new();
+    fs::create_dir(test_directory.path("man")).expect("writable");
+    assert_eq!(test_directory.say(&["man", "man"]).code, Some(0));
+    let help = test_directory.say(&["-h"]).out;
+    let (_, commands) = help.split_once("Commands:\n").expect("the list");
+    let lines = commands.lines().take_while(|line| !line.is_empty());
+    let named = lines
+        .filter(|line| !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next());
+    let mut pages: Vec<_> =
+        named.filter(|name| *name != "help").map(|name| format!("signorini-{name}.1")).collect();
+    assert!(pages.len() > 10, "{help}");
+    pages.push("signorini.1".to_owned());
+    pages.sort();
+    assert_eq!(test_directory.names("man"), pages);
+    assert!(test_directory.read("man/signorini-run.1").contains("accuracy\\-of"));
 }
 
 /// An iteration is a pair of triangular solves: the table counts as many as `history.csv`.

@@ -4,6 +4,7 @@ use crate::{
     meshes::GEO,
     test_directory::{TestDirectory, square},
 };
+use std::{fs, path::Path};
 
 #[test]
 fn the_scene_in_the_results_runs_again_to_the_same_answer() {
@@ -76,6 +77,48 @@ fn the_summary_tells_the_program_the_time_the_place_and_the_command() {
     let command = provenance["command"].as_array().expect("words");
     assert_eq!(command[1..], ["run", "scene.toml", "--set", "time.step=0.5"]);
     let directory = provenance["directory"].as_str().expect("a path");
-    assert!(std::path::Path::new(directory).join("scene.toml").exists(), "{directory}");
+    assert!(Path::new(directory).join("scene.toml").exists(), "{directory}");
     assert!(provenance["machine"]["cores"].as_u64() > Some(0));
+}
+
+/// The version and the date of a release stand in several files, because other programs read these.
+#[test]
+fn all_files_tell_one_version_and_one_date_of_the_release() {
+    let lines_of = |file: &str| {
+        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file));
+        text.expect("a file of the repository").lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let after = |file: &str, start: &str| {
+        let lines = lines_of(file).into_iter();
+        let found = lines.filter_map(|line| Some(line.strip_prefix(start)?.replace('"', "")));
+        found.collect::<Vec<_>>()
+    };
+    let version = env!("CARGO_PKG_VERSION");
+    assert_eq!(after("scripts/pyproject.toml", "version = "), [version]);
+    assert_eq!(after("CITATION.cff", "version: "), [version]);
+    for file in ["Cargo.toml", "validation/study/Cargo.toml"] {
+        assert!(lines_of(file).contains(&"version.workspace = true".to_owned()), "{file}");
+    }
+    let date = &after("CITATION.cff", "date-released: ")[0];
+    let headings = after("CHANGELOG.md", "## ");
+    let newest = headings.iter().find(|heading| heading.starts_with(|c: char| c.is_ascii_digit()));
+    assert_eq!(newest, Some(&format!("{version} ({date})")));
+}
+
+#[test]
+fn the_long_version_tells_the_commit_and_the_petsc_that_computes() {
+    let test_directory = TestDirectory::new();
+    let [short, long] = ["-V", "--version"].map(|option| test_directory.say(&[option]).out);
+    assert_eq!(short, format!("signorini {}\n", env!("CARGO_PKG_VERSION")));
+    let lines: Vec<_> = long.lines().collect();
+    let [first, commit, petsc] = lines[..] else { panic!("{long}") };
+    assert!(format!("{first}\n") == short && commit.starts_with("commit "), "{long}");
+    let (version, file) =
+        petsc.strip_prefix("PETSc ").and_then(|of| of.split_once(": ")).expect(petsc);
+    assert!(version.split('.').all(|part| part.parse::<u8>().is_ok()), "{long}");
+    let name = Path::new(file).file_name().expect("a file").to_string_lossy().into_owned();
+    assert!(Path::new(file).is_file() && name.ends_with(version), "{long}");
+    test_directory.run(&["--set", "time.step=0.5"]);
+    let libraries = &test_directory.summary("out/scene")["provenance"]["libraries"];
+    assert!(libraries.as_array().expect("names").contains(&name.into()), "{libraries}");
 }

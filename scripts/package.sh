@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# package.sh PROGRAM FOLDER: writes what a package has beside the program: manual pages, completions, changelog.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+program=$1 folder=$2
+
+rm -rf "$folder"
+mkdir -p "$folder"/{man,bash,zsh,fish}
+"$program" man "$folder/man"
+# The options of these commands are those of Python programs. roff(7): lines must not begin with a point, dashes are escaped.
+for name in compare figures info report study table; do
+    {
+        printf '.SH ARGUMENTS\n.nf\n'
+        COLUMNS=80 "$program" "$name" --help | sed 's/\\/\\e/g; s/-/\\-/g; s/^[.'\'']/\\\&&/'
+        printf '.fi\n'
+    } >>"$folder/man/signorini-$name.1"
+done
+"$program" completions bash >"$folder/bash/signorini"
+"$program" completions zsh >"$folder/zsh/_signorini"
+"$program" completions fish >"$folder/fish/signorini.fish"
+# Debian's form of the newest heading of CHANGELOG.md, `## 1.2.3 (2026-01-31)` (deb-changelog(5)).
+read -r version day < <(sed -n 's/^## \([0-9.]*\) (\([0-9-]*\).*/\1 \2/p' CHANGELOG.md)
+maintainer=$(sed -n 's/^maintainer = "\(.*\)"/\1/p' Cargo.toml)
+printf 'signorini (%s-1) unstable; urgency=medium\n\n  * See CHANGELOG.md.gz beside this file.\n\n -- %s  %s\n' \
+    "$version" "$maintainer" "$(LC_ALL=C date --utc --date "$day" '+%a, %d %b %Y %H:%M:%S %z')" >"$folder/changelog"
