@@ -73,7 +73,7 @@ deps-random: deps
 # After `cargo fetch` the other targets need no network.
 build: deps
 	cargo fetch --locked --target $$(rustc -vV | sed -n 's/^host: //p')
-	cargo build --release --locked
+	cargo build --release --locked --workspace
 
 deb: build
 	@scripts/deps.sh $(PACKAGES_DEB)
@@ -107,10 +107,10 @@ keys: build
 test: deps
 	@echo 'make test: about 4 minutes on two cores, 2.5 once the dependencies are compiled'
 	cargo fmt --all --check
-	cargo clippy --locked --all-targets -- -D warnings
-	RUSTDOCFLAGS='-D warnings' cargo doc --locked --no-deps
+	cargo clippy --locked --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps
 	$(PYTHON) -m compileall -q scripts validation
-	@{ cargo test --locked --no-fail-fast \
+	@{ cargo test --locked --workspace --no-fail-fast \
 	    --config "target.'cfg(unix)'.runner = ['$(CURDIR)/scripts/run_tests.sh']" 2>&1; \
 	    echo $$? >target/tests.code; } | tee target/tests.log
 	@awk '/^test result/ { passed += $$4; failed += $$6 } END { print passed + 0 " passed, " failed + 0 " failed" }' \

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# package.sh PROGRAM FOLDER: writes what a package has beside the program: manual pages, completions, changelog.
+# package.sh PROGRAM FOLDER: writes what a package has beside the program: manual pages, completions, licences, changelog.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=$1 folder=$2
@@ -18,8 +18,27 @@ done
 "$program" completions bash >"$folder/bash/signorini"
 "$program" completions zsh >"$folder/zsh/_signorini"
 "$program" completions fish >"$folder/fish/signorini.fish"
+# A paragraph of its own is indented, an empty line is a point (DEP 5).
+{
+    cat <<END
+Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
+Upstream-Name: signorini
+
+Files: *
+Copyright: 2026 The authors of signorini
+License: MIT or Apache-2.0
+Comment: The program contains CHOLMOD's supernodal part and is as a whole under the GPL, version 2 or later:
+ /usr/share/common-licenses/GPL-2.
+
+License: Apache-2.0
+ The text is in /usr/share/common-licenses/Apache-2.0.
+
+License: MIT
+END
+    sed 's/^$/./; s/^/ /' LICENSE-MIT
+} >"$folder/copyright"
 # Debian's form of the newest heading of CHANGELOG.md, `## 1.2.3 (2026-01-31)` (deb-changelog(5)).
 read -r version day < <(sed -n 's/^## \([0-9.]*\) (\([0-9-]*\).*/\1 \2/p' CHANGELOG.md)
 maintainer=$(sed -n 's/^maintainer = "\(.*\)"/\1/p' Cargo.toml)
-printf 'signorini (%s-1) unstable; urgency=medium\n\n  * See CHANGELOG.md.gz beside this file.\n\n -- %s  %s\n' \
+printf 'signorini (%s-1) unstable; urgency=medium\n\n  * See CHANGELOG.md in this folder.\n\n -- %s  %s\n' \
     "$version" "$maintainer" "$(LC_ALL=C date --utc --date "$day" '+%a, %d %b %Y %H:%M:%S %z')" >"$folder/changelog"
