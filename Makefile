@@ -79,7 +79,7 @@ deb: build
 	@scripts/deps.sh $(PACKAGES_DEB)
 	@command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
 	scripts/package.sh $(BINARY) target/package
-	cargo deb --locked --no-build
+	cargo deb --locked --no-build --strip
 	@ls -sh target/debian/*.deb
 
 mesh: build

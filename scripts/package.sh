@@ -37,8 +37,9 @@ License: MIT
 END
     sed 's/^$/./; s/^/ /' LICENSE-MIT
 } >"$folder/copyright"
+gzip -9n <CHANGELOG.md >"$folder/changelog.gz"
 # Debian's form of the newest heading of CHANGELOG.md, `## 1.2.3 (2026-01-31)` (deb-changelog(5)).
 read -r version day < <(sed -n 's/^## \([0-9.]*\) (\([0-9-]*\).*/\1 \2/p' CHANGELOG.md)
 maintainer=$(sed -n 's/^maintainer = "\(.*\)"/\1/p' Cargo.toml)
-printf 'signorini (%s-1) unstable; urgency=medium\n\n  * See CHANGELOG.md in this folder.\n\n -- %s  %s\n' \
-    "$version" "$maintainer" "$(LC_ALL=C date --utc --date "$day" '+%a, %d %b %Y %H:%M:%S %z')" >"$folder/changelog"
+printf 'signorini (%s-1) unstable; urgency=medium\n\n  * See changelog.gz in this folder.\n\n -- %s  %s\n' \
+    "$version" "$maintainer" "$(LC_ALL=C date --utc --date "$day" '+%a, %d %b %Y %H:%M:%S %z')" >"$folder/changelog.Debian"
