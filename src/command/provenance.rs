@@ -34,7 +34,7 @@ fn commit() -> Option<&'static str> {
 /// The version of the program, its commit, and PETSc's version and file. They stay for the life of the process, as clap wants.
 pub fn version() -> &'static str {
     let commit = commit().unwrap_or("not recorded: it was built without make");
-    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| "linked into the program".into());
+    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| "its file is not known".into());
     let [version, of_petsc] = [env!("CARGO_PKG_VERSION"), &petsc::version()];
     format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}").leak()
 }
