@@ -1,6 +1,9 @@
-//! Declares Debian's PETSc, MPI and CHOLMOD to Rust: an explicit list of functions, nothing else.
+//! Finds PETSc, MPI, CHOLMOD, LAPACK and BLAS, and declares an explicit list of their functions to Rust.
+//!
+//! pkg-config knows PETSc: that of `PETSC_DIR` and `PETSC_ARCH`, else of `PKG_CONFIG_PATH`, else the system's. The
+//! compiler that built PETSc (mpicc) knows MPI. What is missing is told in one sentence.
 
-use std::{env, path::PathBuf, process::Command};
+use std::{env, fs, panic, path::PathBuf, process::Command};
 
 /// Everything the `petsc` module calls. A name that is not here does not exist for us.
 const PETSC: &str = "\
@@ -37,48 +40,164 @@ const CHOLMOD: &str = "\
     cholmod_l_camd|cholmod_l_metis|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc|\
     dpotrf_|dpotrs_";
 
+/// MPI's constants that the `petsc` module uses: type, name, and Open MPI's variable.
+const MPI: [[&str; 3]; 5] = [
+    ["Datatype", "DOUBLE", "ompi_mpi_double"],
+    ["Datatype", "BYTE", "ompi_mpi_byte"],
+    ["Op", "SUM", "ompi_mpi_op_sum"],
+    ["Op", "MAX", "ompi_mpi_op_max"],
+    ["Op", "REPLACE", "ompi_mpi_op_replace"],
+];
+
+const OTHER: &str = "set PETSC_DIR or PKG_CONFIG_PATH to another one";
+
 fn main() {
-    println!("cargo:rerun-if-changed=build.rs");
-    let petsc = pkg_config::probe_library("petsc").unwrap_or_else(|e| {
-        panic!("PETSc was not found by pkg-config; run `make deps` (Debian: petsc-dev)\n{e}")
+    println!("cargo::rerun-if-changed=build.rs");
+    for name in ["PETSC_DIR", "PETSC_ARCH", "PKG_CONFIG_PATH", "PKG_CONFIG"] {
+        println!("cargo::rerun-if-env-changed={name}");
+    }
+    if let Err(message) = find_and_declare() {
+        println!("cargo::error={}", message.split_whitespace().collect::<Vec<_>>().join(" "));
+    }
+}
+
+fn find_and_declare() -> Result<(), String> {
+    let known = |package: &str| pkg_config(&["--cflags", "--libs", package]);
+    let system = |libraries: &[&str]| libraries.iter().map(|name| format!("-l{name}")).collect();
+    let petsc = known("petsc >= 3.18").or_else(|e| known("PETSc >= 3.18").map_err(|_| e));
+    let mut words = petsc.map_err(|e| {
+        format!("PETSc was not found ({e}); run `make deps` (Debian: petsc-dev), or {OTHER}")
+    })?;
+    check_configuration(&words)?;
+
+    let compiler = pkg_config(&["--variable=ccompiler", "petsc"]).unwrap_or_default().join("");
+    let mpi =
+        words_of(&compiler, &["-show"], None).or_else(|_| words_of("mpicc", &["-show"], None));
+    let mpi = mpi.or_else(|e| known("mpi-c").or_else(|_| known("mpich")).map_err(|_| e));
+    words.extend(mpi.map_err(|e| {
+        format!("MPI was not found ({e}); run `make deps` (Debian: libopenmpi-dev)")
+    })?);
+    words.extend(known("CHOLMOD").unwrap_or_else(|_| system(&["cholmod"])));
+    let lapack = known("lapack blas").or_else(|_| known("openblas"));
+    words.extend(lapack.unwrap_or_else(|_| system(&["lapack", "blas"])));
+    let linux = env::var("CARGO_CFG_TARGET_OS").is_ok_and(|system| system == "linux");
+    if linux {
+        words.push("-lgomp".into());
+    }
+    link(&words);
+
+    let flags = |word: &&String| word.starts_with("-I") || word.starts_with("-D");
+    let flags: Vec<String> = words.iter().filter(flags).cloned().collect();
+    let variables = "PETSC_COMM_WORLD|M_ARENA_MAX|ompi_mpi_\\w+|SIGNORINI_\\w+";
+    let values = MPI
+        .map(|[kind, name, _]| format!("static const MPI_{kind} SIGNORINI_{name} = MPI_{name};\n"));
+    let headers = format!(
+        "#include <petsctao.h>\n#include <petscsf.h>\n{}\
+         #ifndef OPEN_MPI\n{}#endif\n\
+         void omp_set_max_active_levels(int);\n\
+         void dtrsm_(const char *, const char *, const char *, const char *, const int *, const int *,\
+         const double *, const double *, const int *, double *, const int *);\n\
+         PETSC_EXTERN PetscErrorCode PCCreate_Shell(PC);\n",
+        if linux { "#include <malloc.h>\n" } else { "" },
+        values.concat()
+    );
+    let declarations = declare("petsc", &headers, &flags, PETSC, variables)?;
+    // The constants are addresses of variables in Open MPI, and integers in MPICH.
+    let is_open_mpi = declarations.contains(MPI[0][2]);
+    let constants = MPI.map(|[kind, name, variable]| match is_open_mpi {
+        true => format!(
+            "pub const MPI_{name}: MPI_{kind} = (&raw const {variable}).cast_mut().cast();\n"
+        ),
+        false => format!("pub const MPI_{name}: MPI_{kind} = SIGNORINI_{name};\n"),
     });
-    println!("cargo:rustc-link-lib=mpi");
-    println!("cargo:rustc-link-lib=cholmod");
-    println!("cargo:rustc-link-lib=gomp");
-    println!("cargo:rustc-link-lib=lapack");
-    println!("cargo:rustc-link-lib=blas");
+    write("petsc", &(declarations + &constants.concat()))?;
 
-    let mpi_flags = Command::new("mpicc")
-        .arg("--showme:compile")
-        .output()
-        .expect("mpicc did not run; `make deps` installs it (Debian: libopenmpi-dev)");
-    let mpi_flags = String::from_utf8_lossy(&mpi_flags.stdout).into_owned();
-
-    let mut flags: Vec<String> =
-        petsc.include_paths.iter().map(|path| format!("-I{}", path.display())).collect();
-    flags.extend(mpi_flags.split_whitespace().map(str::to_owned));
-    // Debian's MPI is Open MPI, whose constants are the addresses of variables.
-    let variables =
-        "PETSC_COMM_WORLD|M_ARENA_MAX|ompi_mpi_(double|byte)|ompi_mpi_op_(sum|max|replace)";
-    let headers = "#include <petsctao.h>\n#include <petscsf.h>\n#include <malloc.h>\n\
-                   void omp_set_max_active_levels(int);\n\
-                   void dtrsm_(const char *, const char *, const char *, const char *, const int *, const int *,\
-                   const double *, const double *, const int *, double *, const int *);\n\
-                   PETSC_EXTERN PetscErrorCode PCCreate_Shell(PC);\n";
-    declare("petsc", headers, &flags, PETSC, variables);
     let variables = "CHOLMOD_(LONG|REAL|DOUBLE|SUPERNODAL|GIVEN|NATURAL|PATTERN|OUT_OF_MEMORY|TOO_LARGE|\
                      INVALID)";
-    let headers = "#include <suitesparse/cholmod.h>\n\
+    let headers = "#if __has_include(<suitesparse/cholmod.h>)\n#include <suitesparse/cholmod.h>\n\
+                   #else\n#include <cholmod.h>\n#endif\n\
                    void dpotrf_(const char *, const int *, double *, const int *, int *);\n\
                    void dpotrs_(const char *, const int *, const int *, const double *, const int *, double *,\
                    const int *, int *);\n";
-    declare("cholmod", headers, &[], CHOLMOD, variables);
+    write("cholmod", &declare("cholmod", headers, &flags, CHOLMOD, variables)?)
 }
 
-/// Writes the Rust declarations of some C functions and variables to `OUT_DIR/name.rs`.
-fn declare(name: &str, headers: &str, flags: &[String], functions: &str, variables: &str) {
-    let file = PathBuf::from(env::var("OUT_DIR").unwrap_or_default()).join(format!("{name}.rs"));
-    bindgen::Builder::default()
+/// One sentence if PETSc was built with numbers of other types, or without a package that signorini uses.
+fn check_configuration(words: &[String]) -> Result<(), String> {
+    let folders = words.iter().filter_map(|word| word.strip_prefix("-I"));
+    let files = folders.map(|folder| PathBuf::from(folder).join("petscconf.h"));
+    let (file, text) = files
+        .filter_map(|file| Some((file.display().to_string(), fs::read_to_string(&file).ok()?)))
+        .next()
+        .ok_or_else(|| format!("PETSc's petscconf.h was not found; {OTHER}"))?;
+    let has = |name: &&str| text.lines().any(|line| line.split_whitespace().nth(1) == Some(name));
+    let numbers = ["COMPLEX", "64BIT_INDICES", "REAL_SINGLE", "REAL___FP16", "REAL___FLOAT128"];
+    let numbers = numbers.map(|name| format!("PETSC_USE_{name}"));
+    if let Some(name) = numbers.iter().map(String::as_str).find(has) {
+        let needed = "needed is real double with 32-bit indices";
+        return Err(format!("{file} has {name}; {needed}; {OTHER}"));
+    }
+    match ["PETSC_HAVE_MUMPS", "PETSC_HAVE_PTSCOTCH"].into_iter().find(|name| !has(name)) {
+        Some(name) => Err(format!("{file} lacks {name}; needed are MUMPS and PTScotch; {OTHER}")),
+        None => Ok(()),
+    }
+}
+
+/// The words that pkg-config prints. It looks in the folder of `PETSC_DIR` first.
+fn pkg_config(arguments: &[&str]) -> Result<Vec<String>, String> {
+    let mut path = env::var("PKG_CONFIG_PATH").unwrap_or_default();
+    if let Ok(folder) = env::var("PETSC_DIR") {
+        let folder = PathBuf::from(folder).join(env::var("PETSC_ARCH").unwrap_or_default());
+        let folder = folder.join("lib/pkgconfig");
+        if !["petsc.pc", "PETSc.pc"].iter().any(|file| folder.join(file).exists()) {
+            let folder = folder.display();
+            return Err(format!("{folder} of PETSC_DIR and PETSC_ARCH has no petsc.pc"));
+        }
+        path = format!("{}:{path}", folder.display());
+    }
+    let program = env::var("PKG_CONFIG").unwrap_or("pkg-config".into());
+    words_of(&program, arguments, Some(&path))
+}
+
+/// The words that a program prints, or its name and last complaint.
+fn words_of(program: &str, arguments: &[&str], path: Option<&str>) -> Result<Vec<String>, String> {
+    let mut command = Command::new(program);
+    let output = command.args(arguments).envs(path.map(|path| ("PKG_CONFIG_PATH", path))).output();
+    let output = output.map_err(|e| format!("{program}: {e}"))?;
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    if !output.status.success() {
+        let complaint = text(&output.stderr).lines().last().unwrap_or("it failed").to_owned();
+        return Err(format!("{program} {}: {complaint}", arguments.join(" ")));
+    }
+    Ok(text(&output.stdout).split_whitespace().map(str::to_owned).collect())
+}
+
+/// Passes libraries and their folders to the linker. Programs find libraries at run time also in folders that are not the
+/// system's (rpath). `DEP_PETSC_RPATH` names these folders to the build scripts of packages that use this one.
+fn link(words: &[String]) {
+    words.iter().filter_map(|word| word.strip_prefix("-l")).for_each(|library| {
+        println!("cargo::rustc-link-lib={library}");
+    });
+    let mut own = Vec::new();
+    for folder in words.iter().filter_map(|word| word.strip_prefix("-L")) {
+        println!("cargo::rustc-link-search=native={folder}");
+        if !["/usr/lib", "/lib"].iter().any(|system| folder.starts_with(system)) {
+            println!("cargo::rustc-link-arg=-Wl,-rpath,{folder}");
+            own.push(folder);
+        }
+    }
+    println!("cargo::metadata=RPATH={}", own.join(":"));
+}
+
+/// The Rust declarations of some C functions and variables.
+fn declare(
+    name: &str,
+    headers: &str,
+    flags: &[String],
+    functions: &str,
+    variables: &str,
+) -> Result<String, String> {
+    let builder = bindgen::Builder::default()
         .header_contents(&format!("{name}_headers.h"), headers)
         .clang_args(flags)
         .allowlist_function(functions)
@@ -86,11 +205,20 @@ fn declare(name: &str, headers: &str, flags: &[String], functions: &str, variabl
         .default_enum_style(bindgen::EnumVariation::ModuleConsts)
         .layout_tests(false)
         .generate_comments(false)
-        .derive_default(true)
-        .generate()
-        .unwrap_or_else(|e| {
-            panic!("bindgen could not read the headers of {name}; run `make deps`\n{e}")
-        })
-        .write_to_file(file)
-        .expect("the build directory is writable");
+        .derive_default(true);
+    // bindgen panics if there is no libclang.
+    panic::set_hook(Box::new(|_| {}));
+    let declarations = panic::catch_unwind(panic::AssertUnwindSafe(|| builder.generate()));
+    let advice = "run `make deps` (Debian: libclang-dev)";
+    match declarations {
+        Ok(Ok(declarations)) => Ok(declarations.to_string()),
+        Ok(Err(e)) => Err(format!("the headers of {name} could not be read ({e}); {advice}")),
+        Err(_) => Err(format!("libclang was not found; {advice}")),
+    }
+}
+
+/// Writes the declarations for `petsc::raw` or `linear`.
+fn write(name: &str, declarations: &str) -> Result<(), String> {
+    let file = PathBuf::from(env::var("OUT_DIR").unwrap_or_default()).join(format!("{name}.rs"));
+    fs::write(&file, declarations).map_err(|e| format!("{}: {e}", file.display()))
 }

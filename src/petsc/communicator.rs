@@ -4,7 +4,7 @@ use super::{raw, session::world};
 use std::{
     env,
     ffi::{c_int, c_void},
-    ptr,
+    mem,
     time::{Duration, Instant},
 };
 
@@ -69,7 +69,7 @@ impl Communicator {
 
     /// Replaces each value by its sum over the ranks.
     pub fn sum(self, values: &mut [f64]) {
-        self.reduce(values, predefined(&raw const raw::ompi_mpi_op_sum));
+        self.reduce(values, raw::MPI_SUM);
     }
 
     /// The sum of the ranks' values.
@@ -90,7 +90,7 @@ impl Communicator {
             return value;
         }
         let mut max = [if value.is_nan() { f64::NEG_INFINITY } else { value }];
-        self.reduce(&mut max, predefined(&raw const raw::ompi_mpi_op_max));
+        self.reduce(&mut max, raw::MPI_MAX);
         max[0]
     }
 
@@ -117,9 +117,8 @@ impl Communicator {
         // MPI's counts have 32 bits.
         for part in bytes.chunks_mut(1 << 30).filter(|_| !self.is_serial()) {
             let (data, count) = (part.as_mut_ptr().cast::<c_void>(), part.len() as c_int);
-            let byte = predefined(&raw const raw::ompi_mpi_byte);
             // SAFETY: MPI runs on several ranks, and each of them has `count` bytes at `data`.
-            unsafe { raw::MPI_Bcast(data, count, byte, 0, world()) };
+            unsafe { raw::MPI_Bcast(data, count, raw::MPI_BYTE, 0, world()) };
         }
         bytes
     }
@@ -153,13 +152,14 @@ impl Communicator {
             return true;
         }
         let started = Instant::now();
-        let mut request = ptr::null_mut();
         let mut complete = 0;
-        // SAFETY: MPI runs on several ranks; the request lives until it is complete or the run ends.
+        // SAFETY: MPI runs on several ranks; the request lives until it is complete or the run ends. MPI sets it and the
+        // status, plain C data.
         unsafe {
+            let (mut request, mut status) = (mem::zeroed(), mem::zeroed());
             raw::MPI_Ibarrier(world(), &mut request);
             loop {
-                raw::MPI_Test(&mut request, &mut complete, ptr::null_mut());
+                raw::MPI_Test(&mut request, &mut complete, &mut status);
                 if complete != 0 || limit.is_some_and(|limit| started.elapsed() > limit) {
                     return complete != 0;
                 }
@@ -187,17 +187,14 @@ impl Communicator {
         // SAFETY: only `of_world` makes a communicator of several ranks, so MPI runs. It reads and writes
         // `values.len()` numbers. Its error handler ends the run.
         unsafe {
-            raw::MPI_Allreduce(from, to, values.len() as c_int, double(), operation, world());
+            raw::MPI_Allreduce(
+                from,
+                to,
+                values.len() as c_int,
+                raw::MPI_DOUBLE,
+                operation,
+                world(),
+            );
         }
     }
-}
-
-/// MPI_DOUBLE.
-pub(super) fn double() -> raw::MPI_Datatype {
-    predefined(&raw const raw::ompi_mpi_double)
-}
-
-/// One of Open MPI's constants, which are the addresses of variables.
-pub(super) fn predefined<T, U>(variable: *const T) -> *mut U {
-    variable.cast_mut().cast()
 }

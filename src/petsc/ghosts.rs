@@ -1,15 +1,8 @@
 //! Ghost values: copies of values that other ranks own
 //! (<https://petsc.org/release/manualpages/PetscSF/>).
 
-use super::{
-    PetscError, Session, check,
-    communicator::{double, predefined},
-    handle::Handle,
-    raw,
-    session::world,
-    vector::same_size,
-};
-use std::{ffi::c_void, ptr};
+use super::{PetscError, Session, check, handle::Handle, raw, session::world, vector::same_size};
+use std::ffi::c_void;
 
 /// Fetches ghost values from their owners (PetscSF, a star forest: one owner, many ghosts).
 #[derive(Debug)]
@@ -51,13 +44,13 @@ impl Ghosts {
     /// Collective.
     pub(crate) fn update(&self, field: &mut [f64], block: usize) -> Result<(), PetscError> {
         same_size(block * self.length, field.len())?;
-        let mut unit = ptr::null_mut();
+        let mut unit = raw::MPI_DOUBLE;
         let (sf, data) = (self.handle.raw(), field.as_mut_ptr().cast::<c_void>());
-        let replace = predefined(&raw const raw::ompi_mpi_op_replace);
+        let replace = raw::MPI_REPLACE;
         // SAFETY: the field has `block` numbers per value of the graph. PETSc reads the owned ones and
         // writes the ghosts, which do not overlap. It copies the data type if it keeps it.
         unsafe {
-            raw::MPI_Type_contiguous(block as i32, double(), &mut unit);
+            raw::MPI_Type_contiguous(block as i32, raw::MPI_DOUBLE, &mut unit);
             raw::MPI_Type_commit(&mut unit);
             let updated = check(raw::PetscSFBcastBegin(sf, unit, data, data, replace))
                 .and_then(|()| check(raw::PetscSFBcastEnd(sf, unit, data, data, replace)));

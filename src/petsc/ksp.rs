@@ -4,7 +4,7 @@ use super::{
     Matrix, PetscError, Session, Vector, check,
     error::{NOT_DEFINITE, return_code},
     handle::Handle,
-    options::c_string,
+    options::{c_string, is_true, petsc_bool},
     raw,
     session::world,
     shell_preconditioner::{self, Context, ShellPreconditioner},
@@ -113,13 +113,13 @@ impl Ksp {
 
     /// Whether the preconditioner is of the type [`shell_preconditioner::NAME`].
     pub(crate) fn uses_own_factor(&self) -> Result<bool, PetscError> {
-        let mut same = raw::PetscBool::PETSC_FALSE;
+        let mut same = petsc_bool(false);
         let object = self.pc()?.cast::<raw::_p_PetscObject>();
         // SAFETY: a live handle, whose type is compared with a string.
         check(unsafe {
             raw::PetscObjectTypeCompare(object, shell_preconditioner::NAME.as_ptr(), &mut same)
         })?;
-        Ok(same == raw::PetscBool::PETSC_TRUE)
+        Ok(is_true(same))
     }
 
     fn pc(&self) -> Result<raw::PC, PetscError> {
@@ -142,14 +142,14 @@ impl Ksp {
         // SAFETY: live handles; the context outlives the set-up. Without PCSetReusePreconditioner the
         // next solve would factorise again when the values of the matrix have changed.
         unsafe {
-            check(raw::PCSetReusePreconditioner(pc, raw::PetscBool::PETSC_FALSE))?;
+            check(raw::PCSetReusePreconditioner(pc, petsc_bool(false)))?;
             check(raw::KSPSetOperators(ksp, matrix.product(), stored))?;
             context.set(pc)?;
             match check(raw::PCSetUp(pc)) {
                 Err(error) if error.code == NOT_DEFINITE => return Ok(false),
                 set_up => set_up?,
             }
-            check(raw::PCSetReusePreconditioner(pc, raw::PetscBool::PETSC_TRUE))?;
+            check(raw::PCSetReusePreconditioner(pc, petsc_bool(true)))?;
         }
         self.is_definite()
     }

@@ -11,6 +11,7 @@ pub use pattern::Pattern;
 use super::{
     PetscError, Session, Vector, check,
     handle::Handle,
+    options::petsc_bool,
     raw,
     session::world,
     vector::{index, same_size},
@@ -53,11 +54,11 @@ impl Matrix {
             check(raw::MatSeqAIJSetPreallocationCSR(matrix, starts, columns, values))?;
             check(raw::MatMPIAIJSetPreallocationCSR(matrix, starts, columns, values))?;
             for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
-                check(raw::MatSetOption(matrix, option, raw::PetscBool::PETSC_TRUE))?;
+                check(raw::MatSetOption(matrix, option, petsc_bool(true)))?;
             }
             // Inodes (products by groups of rows with equal columns) are slower than products by rows here.
             let inodes = raw::MatOption::MAT_USE_INODES;
-            check(raw::MatSetOption(matrix, inodes, raw::PetscBool::PETSC_FALSE))?;
+            check(raw::MatSetOption(matrix, inodes, petsc_bool(false)))?;
             Self::new(handle)
         }
     }
@@ -199,7 +200,7 @@ impl Matrix {
             }
         }
         let vectors: Vec<raw::Vec> = basis.iter().map(Vector::raw).collect();
-        let (count, constant) = (vectors.len() as i32, raw::PetscBool::PETSC_FALSE);
+        let (count, constant) = (vectors.len() as i32, petsc_bool(false));
         let space = Handle::new(raw::MatNullSpaceDestroy, |space| {
             // SAFETY: `count` live vectors, to which PETSc keeps references.
             unsafe { raw::MatNullSpaceCreate(world(), constant, count, vectors.as_ptr(), space) }

@@ -6,6 +6,16 @@ use std::{
     ptr,
 };
 
+/// A truth value of PETSc: an enumeration up to PETSc 3.23, C's `bool` later.
+pub(super) fn petsc_bool<T: From<bool>>(value: bool) -> T {
+    value.into()
+}
+
+/// The inverse of [`petsc_bool`].
+pub(super) fn is_true<T: From<bool> + PartialEq>(value: T) -> bool {
+    value == T::from(true)
+}
+
 /// Adds options as on a command line (PetscOptionsInsertString).
 pub(super) fn insert(options: &[String]) -> Result<(), PetscError> {
     let line = c_string(&options.join(" "))?;
@@ -16,10 +26,10 @@ pub(super) fn insert(options: &[String]) -> Result<(), PetscError> {
 /// Whether an option is set, which counts as reading it (PetscOptionsHasName).
 pub(crate) fn has_option(name: &str) -> Result<bool, PetscError> {
     let (name, all) = (c_string(name)?, ptr::null_mut());
-    let mut given = raw::PetscBool::PETSC_FALSE;
+    let mut given = petsc_bool(false);
     // SAFETY: the string lives during the call.
     check(unsafe { raw::PetscOptionsHasName(all, ptr::null(), name.as_ptr(), &mut given) })?;
-    Ok(given == raw::PetscBool::PETSC_TRUE)
+    Ok(is_true(given))
 }
 
 /// Sets an option unless it is set (PetscOptionsSetValue).

@@ -1,8 +1,12 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
-    options::c_string, raw, shell_preconditioner,
+    Communicator, PetscError, check,
+    error::keep_message,
+    handle::OPEN_HANDLES,
+    options,
+    options::{c_string, is_true, petsc_bool},
+    raw, shell_preconditioner,
 };
 use crate::memory::address_space;
 use std::{
@@ -38,15 +42,17 @@ impl Session {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         // CHOLMOD asks OpenMP for 4 threads in very short loops, whatever OMP_NUM_THREADS says. Waking them
         // would take a third of a factorisation's time. The setting is one of each thread.
-        // SAFETY: only sets a parameter.
-        unsafe { raw::omp_set_max_active_levels(0) };
         // Each thread would reserve 64 MB of address space for a heap of its own.
-        // SAFETY: only sets a parameter.
-        unsafe { raw::mallopt(raw::M_ARENA_MAX, 1) };
-        let mut running = raw::PetscBool::PETSC_FALSE;
+        // SAFETY: only sets parameters.
+        #[cfg(target_os = "linux")]
+        unsafe {
+            raw::omp_set_max_active_levels(0);
+            raw::mallopt(raw::M_ARENA_MAX, 1);
+        }
+        let mut running = petsc_bool(false);
         // SAFETY: PetscInitialized may be called at any time.
         check(unsafe { raw::PetscInitialized(&mut running) })?;
-        if running == raw::PetscBool::PETSC_FALSE {
+        if !is_true(running) {
             PetscError::if_short(BUFFER + MPI - address_space(), "to start (ulimit -v)")?;
             initialize(options)?;
             PetscError::if_short(BUFFER - address_space(), "to start (ulimit -v)")?;
@@ -71,8 +77,12 @@ impl Session {
     /// Objects made from this session still have an owner, or PETSc fails to finalize.
     pub fn finalize(self) -> Result<(), PetscError> {
         match OPEN_HANDLES.load(Ordering::Relaxed) {
-            // SAFETY: no object of PETSc is in use any more.
-            0 => check(unsafe { raw::PetscFinalize() }),
+            0 => {
+                // PETSc would list the unused options, as the caller does.
+                options::set_default_option("-options_left", "0")?;
+                // SAFETY: no object of PETSc is in use any more.
+                check(unsafe { raw::PetscFinalize() })
+            }
             n => Err(PetscError::ours(format!("{n} PETSc objects outlive their session"))),
         }
     }
