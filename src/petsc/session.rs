@@ -91,10 +91,12 @@ impl Session {
 /// Settings of Open MPI for a process that no launcher started (a singleton). With them it starts no
 /// daemon and opens no network, which takes two thirds of PETSc's start. It makes no directory of
 /// temporary files either: all singletons of a user would share it, and one that ends would remove
-/// the files of another.
-const SINGLETON: [(&str, &str); 3] = [
+/// the files of another. Open MPI 5 refuses to start without a home folder, which a service may lack.
+const SINGLETON: [(&str, &str); 5] = [
     ("OMPI_MCA_ess_singleton_isolated", "1"),
     ("OMPI_MCA_pml", "ob1"),
+    ("OMPI_MCA_btl", "self"),
+    ("HOME", "/"),
     ("OMPI_MCA_orte_create_session_dirs", "0"),
 ];
 

@@ -270,12 +270,17 @@ fn the_profile_has_the_parts_of_a_step_and_counts_the_pairs_of_triangular_solves
 }
 
 #[test]
-fn a_process_alone_needs_no_directory_of_temporary_files() {
+fn a_process_alone_needs_no_home_and_no_directory_of_temporary_files() {
     // Open MPI's is common to all processes of a user, who would make and remove it at the same time.
     let test_directory = TestDirectory::new();
-    let mut command = test_directory.command(&["run", "scene.toml"]);
-    let said = ProgramOutput::of(command.env("TMPDIR", "/proc/none"));
-    assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
+    for (name, value) in
+        [("TMPDIR", Some("/proc/none")), ("HOME", Some("/proc/none")), ("HOME", None)]
+    {
+        let mut command = test_directory.command(&["run", "scene.toml"]);
+        command.env_remove(name).envs(value.map(|value| (name, value)));
+        let said = ProgramOutput::of(&mut command);
+        assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{name} {value:?}: {said:?}");
+    }
 }
 
 #[test]

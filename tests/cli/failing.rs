@@ -36,7 +36,7 @@ fn a_solver_that_misses_its_tolerance_or_has_no_iterations() {
         );
     }
     fails_at_the_third_step(
-        &["--solver", "tao:tron", "--", "-tao_max_it", "0"],
+        &["--solver", "tao:tron", "--", "-tao_max_funcs", "0"],
         &["tao:tron stopped after 0 iterations", "stationarity 1.0e0 (1.0e10 times it)"],
     );
     let none = sets(&["contact.penalty_duality.iterations=0", "contact.rescue=false"]);
@@ -78,7 +78,7 @@ fn a_static_solve_fails_without_a_word_of_steps() {
     let test_directory = TestDirectory::new();
     let text = SCENE.replace("[time]\nend = 1\nstep = 0.1\n", "");
     test_directory.write("scene.toml", &text);
-    let none = ["run", "scene.toml", "--solver", "tao:tron", "--", "-tao_max_it", "0"];
+    let none = ["run", "scene.toml", "--solver", "tao:tron", "--", "-tao_max_funcs", "0"];
     let said = test_directory.say(&none);
     said.fails(
         1,
