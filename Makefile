@@ -1,4 +1,4 @@
-# On Debian 12 every target first installs what it lacks; that is silent and quick when
+# On Debian and Ubuntu every target first installs what it lacks; that is silent and quick when
 # nothing is lacking.
 
 PYTHON ?= /usr/bin/python3
@@ -16,6 +16,8 @@ CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridg
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
     python3-meshio python3-matplotlib
+# The tests look at processes with ps.
+PACKAGES_TEST := procps
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
 # dpkg-shlibdeps finds the packages of the libraries.
@@ -29,9 +31,9 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-validate deps-random build deb mesh run figures keys test validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random build deb mesh run figures keys test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook \
-    constants architecture fuzz clean
+    constants architecture fuzz systems clean
 
 help:
 	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
@@ -59,10 +61,14 @@ help:
 	@echo 'make constants  the register of tuned constants, validation/CONSTANTS.md, from their comments'
 	@echo 'make architecture  the picture of the rooms of src, geo/rooms.svg, from their use lines'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
+	@echo 'make systems    all of this on other Debians and Ubuntus, in chroots (root, an hour); or SYSTEMS="trixie sid"'
 	@echo 'make clean      remove the build, the results and the meshes'
 
 deps:
 	@scripts/deps.sh $(PACKAGES)
+
+deps-test: deps-test
+	@scripts/deps.sh $(PACKAGES_TEST)
 
 deps-validate: deps
 	@scripts/deps.sh $(PACKAGES_VALIDATE)
@@ -189,6 +195,11 @@ fuzz: deps
 	        target/fuzz/corpus/$$target $$seeds -- -runs=$$runs -dict=validation/fuzz/words.dict \
 	        -max_len=16384 -timeout=10 -rss_limit_mb=1024 -print_final_stats=1; \
 	done
+
+# The archives and the steps are variables: see the script. The runs of this machine are compared.
+SYSTEMS ?=
+systems: mesh run
+	scripts/systems.sh $(SYSTEMS)
 
 clean:
 	rm -rf target out geo/*.msh scripts/__pycache__ scripts/*/__pycache__ validation/__pycache__ scripts/build \

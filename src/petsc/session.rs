@@ -11,7 +11,8 @@ use super::{
 use crate::memory::address_space;
 use std::{
     env,
-    ffi::{CStr, CString, c_char, c_int},
+    ffi::{CStr, CString, OsString, c_char, c_int},
+    path::Path,
     ptr,
     sync::{Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
@@ -91,20 +92,26 @@ impl Session {
 /// Settings of Open MPI for a process that no launcher started (a singleton). With them it starts no
 /// daemon and opens no network, which takes two thirds of PETSc's start. It makes no directory of
 /// temporary files either: all singletons of a user would share it, and one that ends would remove
-/// the files of another. Open MPI 5 refuses to start without a home folder, which a service may lack.
-const SINGLETON: [(&str, &str); 5] = [
+/// the files of another. Open MPI 5 does not start without a home and a folder of temporary
+/// files, which a service may lack.
+const SINGLETON: [(&str, &str); 6] = [
     ("OMPI_MCA_ess_singleton_isolated", "1"),
     ("OMPI_MCA_pml", "ob1"),
     ("OMPI_MCA_btl", "self"),
     ("HOME", "/"),
+    ("TMPDIR", "/tmp"),
     ("OMPI_MCA_orte_create_session_dirs", "0"),
 ];
 
-/// Sets the environment variables that the user has not set, and returns their names.
-fn set_missing(variables: &[(&'static str, &str)]) -> Vec<&'static str> {
-    let missing = variables.iter().filter(|(name, _)| env::var_os(name).is_none());
+/// Sets the environment variables that the user has not set, or that name no folder where the value does. Returns them as
+/// they were.
+fn set_missing(variables: &[(&'static str, &str)]) -> Vec<(&'static str, Option<OsString>)> {
+    let serves = |old: &OsString, value: &str| !value.starts_with('/') || Path::new(old).is_dir();
+    let all = variables.iter().map(|&(name, value)| (name, value, env::var_os(name)));
+    let missing = all.filter(|(_, value, old)| !old.as_ref().is_some_and(|old| serves(old, value)));
     // SAFETY: PETSc has no threads yet; those of tests read the environment through std.
-    missing.inspect(|(name, value)| unsafe { env::set_var(name, value) }).map(|v| v.0).collect()
+    let set = missing.inspect(|(name, value, _)| unsafe { env::set_var(name, value) });
+    set.map(|(name, _, old)| (name, old)).collect()
 }
 
 /// Starts PETSc; its errors keep their message for [`check`] instead of printing a trace.
@@ -127,7 +134,10 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
         check(unsafe { raw::PetscInitialize(&mut count, &mut argv, ptr::null(), ptr::null()) });
     // This process may start others (gmsh), which must not inherit the settings.
     // SAFETY: as in `set_missing`.
-    temporary.into_iter().for_each(|name| unsafe { env::remove_var(name) });
+    temporary.into_iter().for_each(|(name, old)| match old {
+        Some(old) => unsafe { env::set_var(name, old) },
+        None => unsafe { env::remove_var(name) },
+    });
     started?;
     // SAFETY: PETSc runs; the handler needs no context.
     check(unsafe { raw::PetscPushErrorHandler(Some(keep_message), ptr::null_mut()) })?;

@@ -295,11 +295,11 @@ fn large_displacements_and_their_foundation_and_moving_loads_are_shown_where_the
          results = read_results(Path('out/scene'))\n\
          limits = limits_of([results])\n\
          def plate(figure):\n\
-         \x20   return sorted({round(line.get_ydata().max(), 6) for line in figure.axes[0].lines if len(line.get_xdata()) == 5 and line.get_linewidth() == 1.8})\n\
+         \x20   return sorted({round(float(line.get_ydata().max()), 6) for line in figure.axes[0].lines if len(line.get_xdata()) == 5 and line.get_linewidth() == 1.8})\n\
          print(results.factor, plate(draw_setting(results, limits)), plate(draw_stress_and_damage(results, limits)))\n\
          for time in (0.2, 0.8):\n\
          \x20   axes = draw_state(read_results(Path('out/scene'), time), limits).axes[0]\n\
-         \x20   print([len(of.X) for of in axes.collections if isinstance(of, Quiver)], [round(of.Y.mean(), 1) for of in axes.collections if isinstance(of, Quiver) and len(of.X)])";
+         \x20   print([len(of.X) for of in axes.collections if isinstance(of, Quiver)], [round(float(of.Y.mean()), 1) for of in axes.collections if isinstance(of, Quiver) and len(of.X)])";
     let Some(said) = python(&directory, draws) else { return };
     assert_eq!(said, "1.0 [1.01] [0.81]\n[10, 0] [0.2]\n[10, 0] [0.7]\n");
 }
