@@ -53,11 +53,13 @@ fresh() {
     done
     mount --bind "$CARGO/registry" "$root/root/.cargo/registry"
     cp /etc/resolv.conf "$root/etc/resolv.conf"
+    # Networks may have certificates of their own.
+    cp "${SSL_CERT_FILE-/etc/ssl/certs/ca-certificates.crt}" "$root/root/certificates.crt"
 }
 
 # inside FOLDER COMMAND, as on a machine that has just been installed.
 inside() {
-    chroot "$root" env -i HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive CARGO_NET_OFFLINE=true \
+    chroot "$root" env -i HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive CARGO_HTTP_CAINFO=/root/certificates.crt \
         OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
         PATH=/root/.cargo/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin sh -ec "cd $1; $2"
 }

@@ -184,17 +184,11 @@ impl Communicator {
         }
         let sent = values.to_vec();
         let (from, to) = (sent.as_ptr().cast::<c_void>(), values.as_mut_ptr().cast::<c_void>());
+        let (count, kind) = (values.len() as c_int, raw::MPI_DOUBLE);
         // SAFETY: only `of_world` makes a communicator of several ranks, so MPI runs. It reads and writes
         // `values.len()` numbers. Its error handler ends the run.
         unsafe {
-            raw::MPI_Allreduce(
-                from,
-                to,
-                values.len() as c_int,
-                raw::MPI_DOUBLE,
-                operation,
-                world(),
-            );
+            raw::MPI_Allreduce(from, to, count, kind, operation, world());
         }
     }
 }

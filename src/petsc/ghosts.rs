@@ -46,14 +46,13 @@ impl Ghosts {
         same_size(block * self.length, field.len())?;
         let mut unit = raw::MPI_DOUBLE;
         let (sf, data) = (self.handle.raw(), field.as_mut_ptr().cast::<c_void>());
-        let replace = raw::MPI_REPLACE;
         // SAFETY: the field has `block` numbers per value of the graph. PETSc reads the owned ones and
         // writes the ghosts, which do not overlap. It copies the data type if it keeps it.
         unsafe {
             raw::MPI_Type_contiguous(block as i32, raw::MPI_DOUBLE, &mut unit);
             raw::MPI_Type_commit(&mut unit);
-            let updated = check(raw::PetscSFBcastBegin(sf, unit, data, data, replace))
-                .and_then(|()| check(raw::PetscSFBcastEnd(sf, unit, data, data, replace)));
+            let updated = check(raw::PetscSFBcastBegin(sf, unit, data, data, raw::MPI_REPLACE))
+                .and_then(|()| check(raw::PetscSFBcastEnd(sf, unit, data, data, raw::MPI_REPLACE)));
             raw::MPI_Type_free(&mut unit);
             updated
         }
