@@ -14,6 +14,7 @@ fn shown(directory: &TestDirectory, columns: usize, arguments: &str) -> Vec<Stri
             "/dev/null",
         ])
         .current_dir(directory.path("."))
+        .env("TERM", "xterm")
         .output()
         .expect("script(1)");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
