@@ -67,7 +67,7 @@ help:
 deps:
 	@scripts/deps.sh $(PACKAGES)
 
-deps-test: deps-test
+deps-test: deps
 	@scripts/deps.sh $(PACKAGES_TEST)
 
 deps-validate: deps
@@ -110,7 +110,7 @@ keys: build
 	@chmod --reference=geo/KEYS.md geo/KEYS.md.new && mv geo/KEYS.md.new geo/KEYS.md
 
 # `tee` shows the output; the exit code is that of the tests.
-test: deps
+test: deps-test
 	@echo 'make test: about 4 minutes on two cores, 2.5 once the dependencies are compiled'
 	cargo fmt --all --check
 	cargo clippy --locked --workspace --all-targets -- -D warnings
