@@ -7,7 +7,7 @@ curved), ζ is P1. u comes out in the order of the nodes of `Lagrange`, ζ in th
 triangulation. The contact step is solved by a primal-dual active set and conjugate gradients, preconditioned by a
 Cholesky factor (CHOLMOD) of an earlier matrix, which is renewed when it needs more than `--keep`
 iterations (0: for every linear system). Contact and symmetry must be along x or y. Written for
-dolfinx 0.5 (Debian 12), as fast as we found: blocks of two, forms compiled for this processor.
+dolfinx 0.5 to 0.11 (Debian 12 and newer), as fast as we found: blocks of two, forms compiled for this processor.
 
 Prints one JSON object: seconds of each step, counts, the worst relative KKT residual, the last state.
 """
@@ -25,16 +25,16 @@ from pathlib import Path
 # Otherwise CHOLMOD would wake four threads in every supernode, whatever OMP_NUM_THREADS says.
 os.environ.setdefault("OMP_THREAD_LIMIT", "1")
 
-import basix
 import dolfinx
 import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.io import XDMFFile
-from mpi4py import MPI
 from petsc4py import PETSc
 
+import dolfinx_api as api
 import shared  # noqa: F401
+from dolfinx_api import form
 from expressions import Expression
 from lagrange import Lagrange
 from scene import (
@@ -44,14 +44,13 @@ from triangulation import edge_keys, read_triangulation
 
 logging.disable(logging.INFO)  # the form compiler reports each of its builds
 
-JIT = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
 # Residuals of the linear systems over the largest load so far; signs in the active set over the largest
 # load and displacement; the largest relative KKT residual of an answer; guesses of the active set.
 LINEAR, SIGN, KKT, GUESSES = 1e-11, 1e-10, 1e-9, 100
 UFL_FUNCTIONS = {
     "pi": np.pi, "sin": ufl.sin, "cos": ufl.cos, "tan": ufl.tan, "sqrt": ufl.sqrt,
     "exp": ufl.exp, "log": ufl.ln, "abs": abs,
-    "min": ufl.min_value, "max": ufl.max_value, "atan2": ufl.atan_2,
+    "min": ufl.min_value, "max": ufl.max_value, "atan2": api.atan2,
     "if_": ufl.conditional, "And": ufl.And, "Or": ufl.Or,
 }
 
@@ -98,10 +97,6 @@ class ContactError(Exception):
     """The contact step was not solved to the accuracy a reference needs."""
 
 
-def form(expression):
-    return fem.form(expression, jit_params=JIT)
-
-
 def cholesky(matrix):
     """A factor by CHOLMOD; the symbolic analysis is kept when the matrix changes."""
     factor = PETSc.PC().create(PETSc.COMM_SELF)
@@ -115,7 +110,7 @@ def per_triangle(domain, values):
     """A function that is constant on each triangle, from values in the order of the file."""
     if (values == values[0]).all():
         return fem.Constant(domain, PETSc.ScalarType(values[0]))
-    function = fem.Function(fem.FunctionSpace(domain, ("Discontinuous Lagrange", 0)))
+    function = fem.Function(api.space(domain, "Discontinuous Lagrange", 0))
     function.x.array[:] = values[domain.topology.original_cell_index]
     return function
 
@@ -132,8 +127,8 @@ class Body:
         domain = self.domain = dolfinx_mesh(self.nodes if curved else vertices)
         self.straight = dolfinx_mesh(vertices) if curved else domain
         self.time = fem.Constant(domain, PETSc.ScalarType(0.0))
-        self.V = fem.VectorFunctionSpace(domain, ("Lagrange", self.order))
-        self.E = fem.FunctionSpace(domain, ("Lagrange", 1))
+        self.V = api.space(domain, "Lagrange", self.order, is_vector=True)
+        self.E = api.space(domain, "Lagrange", 1)
         self.dof_of_node = dof_of_node(self.V, self.nodes)
         self.zeta_dof_of_node = dof_of_node(self.E, vertices)
         self.u, self.zeta = fem.Function(self.V), fem.Function(self.E)
@@ -259,7 +254,7 @@ class Damage:
         for key in ("diffusion", "lambda_d", "lambda_u", "lambda_w", "strain_cap"):
             values = of_material(body.scene, body.mesh, "damage", key, DAMAGE.get(key))
             self.law[key] = per_triangle(domain if key == "diffusion" else body.domain, values)
-        space = fem.FunctionSpace(domain, ("Lagrange", 1))
+        space = api.space(domain, "Lagrange", 1)
         self.dof_of_node = dof_of_node(space, Lagrange(body.mesh, 1))
         self.zeta = fem.Function(space)
         zeta, xi = ufl.TrialFunction(space), ufl.TestFunction(space)
@@ -272,13 +267,12 @@ class Damage:
         # the triangle's strain: as a discontinuous P1 function it is then integrated exactly. For
         # P2 at the points of the quadrature, which is exact for M ζₙ₋₁, too.
         if body.order == 1:
-            source = fem.FunctionSpace(domain, ("Discontinuous Lagrange", 1))
-            points = source.element.interpolation_points()
+            source = api.space(domain, "Discontinuous Lagrange", 1)
+            points = api.interpolation_points(source)
         else:
-            source = fem.FunctionSpace(domain, ufl.FiniteElement("Quadrature", ufl.triangle, 2, quad_scheme="default"))
-            points, _ = basix.make_quadrature(basix.CellType.triangle, 2)
+            source, points = api.quadrature_space(domain, 2)
         self.source = fem.Function(source)
-        self.source_at_points = fem.Expression(self.phi(ufl.sym(ufl.grad(body.u)), body.zeta), points, jit_params=JIT)
+        self.source_at_points = fem.Expression(self.phi(ufl.sym(ufl.grad(body.u)), body.zeta), points, **api.JIT)
         # The cells of the body's own mesh, in the order of the straight ones.
         place = np.argsort(body.domain.topology.original_cell_index)
         self.cells = place[domain.topology.original_cell_index].astype(np.int32)
@@ -294,8 +288,9 @@ class Damage:
 
     def advance(self):
         """ζₙ from the body's current u and ζ, in the node order of the triangulation."""
-        body, values = self.body, self.source_at_points.eval(self.cells)
-        self.source.x.array[self.source.function_space.dofmap.list.array] = values.ravel()
+        body = self.body
+        values = api.values(self.source_at_points, body.domain, self.cells)
+        self.source.x.array[api.dofs(self.source.function_space).ravel()] = values.ravel()
         self.zeta.x.array[self.dof_of_node] = body.zeta.x.array[body.zeta_dof_of_node]
         right = fem.petsc.assemble_vector(self.right_side)
         zeta, correction = right.duplicate(), right.duplicate()
@@ -421,9 +416,8 @@ class Contact:
 def dolfinx_mesh(nodes):
     """The mesh whose coordinates are interpolated between the nodes: straight triangles from the
     vertices, parabolic sides from the nodes of P2."""
-    element = ufl.VectorElement("Lagrange", ufl.triangle, nodes.order)
     cells = nodes.elements[:, DOLFINX_ORDER[:nodes.elements.shape[1]]]
-    return dolfinx.mesh.create_mesh(MPI.COMM_SELF, cells, nodes.points, ufl.Mesh(element))
+    return api.create_mesh(cells, nodes.points, nodes.order)
 
 
 def dof_of_node(space, nodes):
@@ -434,7 +428,7 @@ def dof_of_node(space, nodes):
     """
     elements = nodes.elements[space.mesh.topology.original_cell_index]
     dof = np.empty(len(nodes.points), np.int64)
-    dof[elements[:, DOLFINX_ORDER[:elements.shape[1]]]] = (space.dofmap.list.array.reshape(elements.shape))
+    dof[elements[:, DOLFINX_ORDER[:elements.shape[1]]]] = api.dofs(space)
     return dof
 
 
@@ -480,7 +474,7 @@ class Fields:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.file = XDMFFile(body.domain.comm, str(path.with_suffix(".xdmf")), "w")
         self.file.write_mesh(body.domain)
-        linear = fem.VectorFunctionSpace(body.domain, ("Lagrange", 1))
+        linear = api.space(body.domain, "Lagrange", 1, is_vector=True)
         self.fields = [(body.u, fem.Function(linear, name="u")), (body.zeta, fem.Function(body.E, name="zeta"))]
 
     def write(self, t):
