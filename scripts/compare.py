@@ -178,9 +178,6 @@ def main(prog=None):
         rows = [row for scene in arguments.scenes for row in compared(scene, arguments)]
     except Refused as refused:
         return refused.args[0]
-    except OSError as error:
-        print(f"error: {error.filename}: {error.strerror}", file=sys.stderr)
-        return 2
     print(table(rows))
     print("Δ: largest differences from the answer with the smallest residuals; "
           "times first: over the seconds of the scene's first solver")

@@ -48,4 +48,7 @@ except BrokenPipeError:
     # The reader of the output has closed the pipe.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     code = 0
+except OSError as error:
+    print("error:", ": ".join(str(part) for part in (error.filename, error.strerror) if part), file=sys.stderr)
+    code = 2
 sys.exit(code)

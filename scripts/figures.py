@@ -191,7 +191,7 @@ def main(prog=None):
                 print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",
                       file=sys.stderr)
         failed |= bool(problems)
-    if arguments.together:
+    if arguments.together and runs:
         with telling() as problems:
             names = differences([run.folder.name for run in runs])
             save(draw_forces(runs, names), runs[0], "force-displacement-together", arguments.format)

@@ -67,13 +67,12 @@ def main(prog=None):
     parser.add_argument("folder", type=Path, metavar="OUT", help="a folder that `run` has written")
     folder = parser.parse_args().folder
     try:
-        print(description(folder))
-    except BrokenPipeError:
-        raise
+        text = description(folder)
     except (OSError, ValueError) as error:
         problem = error.strerror if isinstance(error, OSError) else error
         print(f"error: {folder / 'summary.json'}: {problem}; name a folder of results, out/SCENE", file=sys.stderr)
         return 2
+    print(text)
     return 0
 
 

@@ -85,7 +85,7 @@ def von_mises_map(results, limits, factor=None):
     title, largest, is_singular = f"von Mises stress ({unit})", results.von_mises.max(), bool(results.singular())
     if OPTIONS.titles:
         said = results.said("von_mises_max", largest, size)
-        title += f", largest {said}" + ": singular (circle)" * (is_singular and largest > 0.0)
+        title += f", largest {said}" + ": singular (circle)" * bool(is_singular and largest > 0.0)
     factor = results.factor if factor is None else factor
 
     def paint(axes):

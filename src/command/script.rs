@@ -43,9 +43,15 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
     require_one_process()?;
     let python = python()?;
     let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
-    let mut sources = tempfile::tempfile().map_err(Failure::from)?;
-    serde_json::to_writer(&sources, &all).map_err(Failure::from)?;
-    sources.rewind().map_err(Failure::from)?;
+    let sources = (|| {
+        let mut file = tempfile::tempfile()?;
+        serde_json::to_writer(&file, &all)?;
+        file.rewind().map(|()| file)
+    })();
+    let sources = sources.map_err(|error| {
+        let folder = env::temp_dir();
+        format!("{}: {error}; set TMPDIR to another folder for temporary files", folder.display())
+    })?;
     // Python takes the place of this process, and gets its signals.
     let error = Command::new(&python)
         .args(["-c", EMBEDDED, name])

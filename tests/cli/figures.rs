@@ -1,7 +1,7 @@
 //! Figures and reports, where there is a Python that draws them.
 
-use crate::test_directory::{SCENE, TestDirectory, sets, square};
-use std::process::Command;
+use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, sets, square};
+use std::{fs::File, process::Command};
 
 #[test]
 fn figures_and_a_report_are_drawn_far_from_the_scripts() {
@@ -39,6 +39,44 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     test_directory.write(&frame, &test_directory.read(&frame)[..999]);
     let cut = format!("{frame}: it is damaged or cut off");
     test_directory.say(&["figures", "out/scene"]).fails(2, &[&cut]);
+}
+
+/// Without a folder for temporary files, without the packages, or where nothing can be written, every command that
+/// Python does ends with one sentence.
+#[test]
+fn commands_of_python_in_odd_surroundings() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    if directory.say_python(&["table", "out/scene"]).is_none() {
+        return;
+    }
+    let said = |arguments: &[&str], variable: (&str, &str)| {
+        ProgramOutput::of(directory.command(arguments).env(variable.0, variable.1))
+    };
+    for command in ["info", "table", "figures", "report", "study", "compare"] {
+        let absent = said(&[command, "out/scene"], ("TMPDIR", "/absent"));
+        absent.fails(1, &["/absent: No such file", "set TMPDIR to another folder"]);
+        let absent = said(&[command, "out/scene"], ("PYTHON", "absent"));
+        absent
+            .fails(2, &["Python 3.11 or newer with matplotlib and meshio", "absent No such file"]);
+    }
+    directory.say(&["figures", "out/absent", "--together"]).fails(2, &["out/absent/summary.json"]);
+    // No folder can be made below a file.
+    for (command, more) in [("study", &["--set", "time.end=0.1"][..]), ("compare", &[])] {
+        let said =
+            directory.say(&[&[command, "scene.toml", "--out", "scene.toml/below"], more].concat());
+        said.fails(2, &["scene.toml/below", "Not a directory"]);
+        assert_eq!(said.err.lines().count(), 1, "{said:?}");
+    }
+    // Nothing can be written to this device.
+    for command in ["info", "table"] {
+        let full = File::create("/dev/full").expect("a device");
+        let said = directory.command(&[command, "out/scene"]).stdout(full).output();
+        let said = said.expect("the program starts");
+        assert_eq!(said.status.code(), Some(2), "{said:?}");
+        let err = String::from_utf8_lossy(&said.stderr);
+        assert_eq!(err.trim_end(), "error: No space left on device", "{command}");
+    }
 }
 
 /// What Chromium finds in the report: whether the slider changes the picture, how many files it fetches, which windows

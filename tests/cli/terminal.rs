@@ -47,6 +47,35 @@ fn fields_are_shown_whole_or_not_at_all() {
     assert_eq!(last, fields.len());
 }
 
+/// Messages, help and progress on a terminal have no colours if the user wants none or the terminal has none.
+#[test]
+fn colours_are_optional() {
+    let directory = TestDirectory::new();
+    directory.write("wrong.toml", "materal = 3\n");
+    let program = env!("CARGO_BIN_EXE_signorini");
+    let has_colours = |variable: &str, arguments: &str| {
+        let mut command = Command::new("script");
+        command.args(["-qec", &format!("{variable} '{program}' {arguments}"), "/dev/null"]);
+        let output =
+            command.env("TERM", "xterm").env_remove("NO_COLOR").current_dir(directory.path("."));
+        let text = output.output().expect("script(1)").stdout;
+        let text = String::from_utf8_lossy(&text).into_owned();
+        // "Select graphic rendition": ESC [ numbers m.
+        let mut codes = text.split("\x1b[").skip(1);
+        codes.any(|code| {
+            code.trim_start_matches(|c: char| c.is_ascii_digit() || c == ';').starts_with('m')
+        })
+    };
+    assert!(has_colours("", "unknown"), "there are no colours to switch off");
+    let commands =
+        ["unknown", "run --help", "check wrong.toml", "check scene.toml", "run scene.toml"];
+    for (variable, command) in
+        ["NO_COLOR=1", "TERM=dumb"].iter().flat_map(|v| commands.map(|c| (v, c)))
+    {
+        assert!(!has_colours(variable, command), "{variable} signorini {command}");
+    }
+}
+
 #[test]
 fn progress_and_help_fit_any_terminal() {
     let directory = TestDirectory::new();
