@@ -161,7 +161,10 @@ impl Ksp {
         let pc = self.pc()?;
         let mut reason = raw::PCFailedReason::PC_NOERROR;
         let (mut factor, mut package, mut negative) = (ptr::null_mut(), ptr::null(), 0);
-        // SAFETY: a live handle; the package's name is a constant of PETSc.
+        // MatMumpsGetInfog, as its factors have it: a PETSc without MUMPS may not have the function.
+        type Infog = unsafe extern "C" fn(raw::Mat, c_int, *mut c_int) -> raw::PetscErrorCode;
+        let (mut infog, name) = (None::<Infog>, c"MatMumpsGetInfog_C".as_ptr());
+        // SAFETY: a live handle; the package's name is a constant of PETSc; the function has this type.
         unsafe {
             check(raw::PCGetFailedReason(pc, &mut reason))?;
             if reason != raw::PCFailedReason::PC_NOERROR {
@@ -171,7 +174,9 @@ impl Ksp {
             check(raw::PCFactorGetMatSolverType(pc, &mut package))?;
             if !package.is_null() && CStr::from_ptr(package) == c"mumps" {
                 check(raw::PCFactorGetMatrix(pc, &mut factor))?;
-                check(raw::MatMumpsGetInfog(factor, NEGATIVE_PIVOTS, &mut negative))?;
+                let found = (&raw mut infog).cast();
+                check(raw::PetscObjectQueryFunction_Private(factor.cast(), name, found))?;
+                infog.map_or(Ok(()), |get| check(get(factor, NEGATIVE_PIVOTS, &mut negative)))?;
             }
         }
         Ok(negative == 0)
