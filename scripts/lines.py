@@ -1,5 +1,6 @@
 """Curves of fields along a line or a boundary, at several times and of several runs, with their numbers as CSV."""
 
+import os
 import sys
 
 import matplotlib.pyplot as plt
@@ -71,6 +72,8 @@ def _way(run, arguments):
 
 def differences(names):
     """The parts, between double underscores, in which names of folders differ; whole names if they do not."""
+    # Fonts have no signs for bytes that are not UTF-8.
+    names = [os.fsencode(name).decode(errors="replace") for name in names]
     parts = [name.split("__") for name in names]
     common = set(parts[0]).intersection(*parts[1:]) if len(names) > 1 else ()
     return ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
