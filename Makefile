@@ -1,6 +1,7 @@
-# On Debian and Ubuntu every target first installs what it lacks; that is silent and quick when
-# nothing is lacking.
+# On Debian and Ubuntu every target first installs the packages that it lacks; that is silent and quick when
+# nothing is lacking. Elsewhere, and with DEPS=none, it names them and goes on (INSTALL.md).
 
+# Runs the programs in validation/. The program itself looks for a Python with matplotlib, unless PYTHON is given.
 PYTHON ?= /usr/bin/python3
 # Which scenes to run, with which contact solver and other arguments of `signorini run`.
 SCENE ?= $(sort $(wildcard geo/*.toml))
@@ -95,13 +96,13 @@ mesh: build
 run: build
 	@set -e; for scene in $(SCENE); do \
 	    $(BINARY) run $$scene $(if $(SOLVER),--solver $(SOLVER)) $(ARGS); \
-	    $(PYTHON) scripts/figures.py out/$$(basename $$scene .toml); \
+	    $(BINARY) figures out/$$(basename $$scene .toml); \
 	    echo; \
 	done
 
-figures: deps
+figures: build
 	@set -e; for run in $(patsubst %/summary.json,%,$(wildcard out/*/summary.json)); do \
-	    $(PYTHON) scripts/figures.py $$run $(ARGS); \
+	    $(BINARY) figures $$run $(ARGS); \
 	done
 
 # The build reads the old page, so the new one is written beside it. Its mode stays.

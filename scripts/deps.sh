@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # deps.sh PACKAGE…: installs the Debian packages that are missing, and looks for a Rust
-# toolchain. Says nothing when all is there.
+# toolchain. Says nothing when all is there. On a system without dpkg, or with DEPS=none, it names the
+# packages, and the build then reports what it does not find.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -17,8 +18,10 @@ command -v cargo >/dev/null || fail "cargo was not found; $advice"
 found=$(cargo --version | cut -d' ' -f2)
 printf '%s\n' "$wanted" "${found%%-*}" | sort -CV || fail "cargo is version $found; $advice"
 
-command -v dpkg-query >/dev/null ||
-    fail "this is no Debian; install what these Debian 12 packages hold: $*"
+if [ "${DEPS:-}" = none ] || ! command -v dpkg-query >/dev/null; then
+    echo "note: nothing is installed here; needed is the content of these Debian packages (INSTALL.md): $*" >&2
+    exit 0
+fi
 installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "$@" 2>/dev/null || true)
 missing=()
 for package; do
@@ -31,7 +34,8 @@ as_root=()
 if [ "$(id -u)" -ne 0 ]; then
     # Without a terminal nobody can type the password.
     if ! command -v sudo >/dev/null || { [ ! -t 0 ] && ! sudo -n true 2>/dev/null; }; then
-        fail "packages are missing; as root, run: apt-get update && ${install[*]}"
+        fail "packages are missing; as root, run: apt-get update && ${install[*]}
+(or without root, with libraries of your own: make DEPS=none …, see INSTALL.md)"
     fi
     as_root=(sudo)
 fi

@@ -75,6 +75,9 @@ def all_drawn(tasks):
             return dict(zip(tasks, pool.map(call, tasks)))
     except BrokenExecutor:
         raise MemoryError from None
+    except OSError:
+        # Processes need shared memory (/dev/shm), which a container may lack. The same error in a picture comes again.
+        return {name: task() for name, task in tasks.items()}
 
 
 def pictures(results, everything):
