@@ -28,9 +28,7 @@ pub(crate) fn divide(
         let partitioning = Handle::new(raw::MatPartitioningDestroy, create)?;
         check(raw::MatPartitioningSetAdjacency(partitioning.raw(), graph.stored()))?;
         let chosen = check(raw::MatPartitioningSetType(partitioning.raw(), c"ptscotch".as_ptr()));
-        chosen.map_err(|_| {
-            PetscError::ours("runs on several processes need a PETSc with PTScotch")
-        })?;
+        chosen.map_err(|_| PetscError::ours("several processes need a PETSc with PTScotch"))?;
         check(raw::MatPartitioningSetFromOptions(partitioning.raw()))?;
         let apply = |handle| raw::MatPartitioningApply(partitioning.raw(), handle);
         let own = Handle::new(raw::ISDestroy, apply)?;
