@@ -209,11 +209,10 @@ fn declare(
     // bindgen panics if there is no libclang.
     panic::set_hook(Box::new(|_| {}));
     let declarations = panic::catch_unwind(panic::AssertUnwindSafe(|| builder.generate()));
-    let advice = "run `make deps` (Debian: libclang-dev)";
     match declarations {
         Ok(Ok(declarations)) => Ok(declarations.to_string()),
-        Ok(Err(e)) => Err(format!("the headers of {name} could not be read ({e}); {advice}")),
-        Err(_) => Err(format!("libclang was not found; {advice}")),
+        Ok(Err(e)) => Err(format!("the headers of {name} could not be read ({e}); {OTHER}")),
+        Err(_) => Err("libclang was not found; run `make deps` (Debian: libclang-dev)".into()),
     }
 }
 

@@ -59,8 +59,8 @@ fresh() {
 
 # inside FOLDER COMMAND, as on a machine that has just been installed.
 inside() {
-    chroot "$root" env -i HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive CARGO_HTTP_CAINFO=/root/certificates.crt \
-        OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
+    chroot "$root" env -i HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+        CARGO_HTTP_CAINFO=/root/certificates.crt OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 \
         PATH=/root/.cargo/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin sh -ec "cd $1; $2"
 }
 
@@ -72,29 +72,6 @@ step() {
 }
 
 wants() { [[ " $STEPS " == *" $1 "* ]]; }
-
-# difference OURS THEIRS: the largest difference of the figures of their runs, relative to the largest value of the same
-# unit in the run. Places are left out, and what depends on the mesh: singular and unresolved figures.
-difference() {
-    python3 - "$@" <<'PYTHON'
-import json, pathlib, sys
-def read(folder):
-    figures = json.loads((folder / "summary.json").read_text())["figures"]
-    return {name: (f["unit"], f["value"]) for name, f in figures.items()
-            if f["value"] is not None and not f["singular"] and not f["unresolved"]
-            and not any(word in name for word in ("start_", "end_", "peak_", "acts_at_"))}
-ours, theirs = map(pathlib.Path, sys.argv[1:])
-differences = []
-for folder in [file.parent for file in ours.glob("*/summary.json") if (theirs / file.parent.name).is_dir()]:
-    own, other = read(folder), read(theirs / folder.name)
-    for name in own.keys() & other.keys():
-        scale = max(abs(value) for unit, value in own.values() if unit == own[name][0])
-        differences.append((abs(own[name][1] - other[name][1]) / (scale or 1), f"{folder.name}: {name}"))
-largest, name = max(differences, default=(float("nan"), "nothing to compare"))
-print(f"{largest:.0e}")
-print(f"largest difference: {largest:.1e}, {name}", file=sys.stderr)
-PYTHON
-}
 
 # The Containerfile: a fresh system per FROM, its RUN lines, and its COPY lines from the checkout or an earlier stage.
 container() {
@@ -121,15 +98,16 @@ run_system() {
     step packages /src 'make deps' && packages=$cell
     step build /src 'make build' && build=$cell
     versions=$(inside / '. /etc/os-release; printf "%s | " "$PRETTY_NAME"
-        dpkg-query -W -f "\${Version} " petsc-dev libopenmpi-dev gmsh | sed -E "s/^[0-9]+://; s/ ([0-9]+:)?/, /g; s/[+~-][^,]*//g; s/, $//"')
+        dpkg-query -W -f "\${Version} " petsc-dev libopenmpi-dev gmsh |
+            sed -E "s/^[0-9]+://; s/ ([0-9]+:)?/, /g; s/[+~-][^,]*//g; s/, $//"')
     if wants scenes; then
         step scenes /src 'make mesh && make run' && scenes=$cell
-        own=$(difference out "$root/src/out")
+        own=$("${PYTHON-/usr/bin/python3}" validation/systems.py out "$root/src/out")
         # Once more on the meshes of this machine, as gmsh is of another version.
         cp -r "$CHROOTS/meshes" "$root/root/meshes"
         step same /src 'for mesh in /root/meshes/*; do name=$(basename $mesh .msh)
             target/release/signorini run geo/$name.toml --mesh $mesh --out same/$name; done'
-        same=$(difference out "$root/src/same")
+        same=$("${PYTHON-/usr/bin/python3}" validation/systems.py out "$root/src/same")
     fi
     if wants test; then step test /src 'make test' && test=$cell; fi
     if wants validate; then
