@@ -255,9 +255,10 @@ impl<'a> StepController<'a> {
         };
         self.memory.violation.observe(planned, damage.min_max, time);
         let [error, rate, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
-        // An error δζ delays the stop by δζ/ζ′. The error is that of the beginning of this step, and ζ′ there is the mean of the
-        // rates of both steps: the last one alone is too large where ζ falls faster and faster.
-        let delay = (2.0 * error / (rate + rate_before)).abs();
+        // An error δζ delays the stop by δζ/ζ′. The rate at the beginning of the step is about the mean of the rates of both
+        // steps, and the smaller one of it and of the last rate counts: ζ may fall faster and faster, or the load may pass.
+        let slower = rate.abs().min(0.5 * (rate + rate_before).abs());
+        let delay = (error / slower).abs();
         // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
         // by at most half of their relative difference, as a fraction of the step. With uniform steps the last step is the bar.
         let of_step = match self.error_control {
