@@ -41,7 +41,7 @@ bare() {
 # fresh SYSTEM: mounts a writable layer above the bare system, with devices and this machine's toolchain (read-only).
 fresh() {
     root=$CHROOTS/$1.root
-    ! mountpoint -q "$root" || umount -R "$root"
+    ! mountpoint -q "$root" || umount -Rl "$root"
     rm -rf --one-file-system "$root" "$root".{changed,work} && mkdir "$root" "$root".{changed,work}
     mount -t overlay overlay -o "lowerdir=$CHROOTS/${1%-*},upperdir=$root.changed,workdir=$root.work" "$root"
     mount -t proc proc "$root/proc" && mount --rbind /dev "$root/dev" && mount --rbind /sys "$root/sys"
@@ -121,7 +121,7 @@ run_system() {
     printf '%s | ' "| $versions" "$packages" "$build" "$scenes" "$same" "$own" "$test" "$validate" "$container" \
         >"$CHROOTS/$system.row"
     date '+%F |' >>"$CHROOTS/$system.row"
-    umount -R "$CHROOTS/$system"*.root
+    umount -Rl "$CHROOTS/$system"*.root
     rm -rf --one-file-system "$CHROOTS/$system"*.root{,.changed,.work}
 }
 
