@@ -75,7 +75,7 @@ wants() { [[ " $STEPS " == *" $1 "* ]]; }
 
 # The Containerfile: a fresh system per FROM, its RUN lines, and its COPY lines from the checkout or an earlier stage.
 container() {
-    local word rest stage=0 before=
+    local word rest stage=0 before= start=$SECONDS
     while read -r word rest; do
         case $word in
         FROM) before=${root-} stage=$((stage + 1)) && fresh "$system-$stage" ;;
@@ -87,6 +87,7 @@ container() {
         esac
         [[ $cell != failed* ]] || return 0
     done <Containerfile
+    cell="$((SECONDS - start)) s"
 }
 
 run_system() {
