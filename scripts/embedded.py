@@ -44,11 +44,10 @@ try:
     sys.stdout.flush()
 except KeyboardInterrupt as stopped:
     code = stopped.args[0]
-except BrokenPipeError:
-    # The reader of the output has closed the pipe.
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    code = 0
 except OSError as error:
-    print("error:", ": ".join(str(part) for part in (error.filename, error.strerror) if part), file=sys.stderr)
-    code = 2
+    # The reader of the output may have closed the pipe; this is no error. Python writes what it still has at its end.
+    code = 0 if isinstance(error, BrokenPipeError) else 2
+    if code:
+        print("error:", ": ".join(str(part) for part in (error.filename, error.strerror) if part), file=sys.stderr)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 sys.exit(code)
