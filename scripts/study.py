@@ -128,7 +128,9 @@ def is_complete(folder, command, inputs):
     except ValueError:
         return False
     written = (folder / "summary.json").stat().st_mtime
-    return ("error" not in summary and summary["provenance"]["command"][1:] == command
+    # What was interrupted goes on; what is complete stays.
+    words = [[word for word in of if word != "--restart"] for of in (summary["provenance"]["command"][1:], command)]
+    return ("error" not in summary and words[0] == words[1]
             and all(file.stat().st_mtime <= written for file in inputs))
 
 

@@ -42,6 +42,7 @@ impl ErrorBudget {
             if self.can_be_damaged { "damage not measured (see --bars)" } else { "no damage" };
         let damage_mesh = of_damage(self.damage_mesh, missing);
         let of_stop = |off: Option<f64>| match off {
+            Some(off) if off.is_nan() => "the time of ζ_* not estimated".to_owned(),
             Some(off) => format!("the time of ζ_* off by up to {off:.1e}"),
             None => "the time of ζ_* not measured (see --bars)".to_owned(),
         };

@@ -108,7 +108,7 @@ const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json
      open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
-     mesh pressure principal-stresses setting stress stress-damage";
+     force-displacement-together mesh pressure principal-stresses setting stress stress-damage";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
 /// Whether `name` is the name of a result or a figure: frames are `fields_NNNN[_R].[p]vtu` and
@@ -118,13 +118,14 @@ fn is_result(name: &str) -> bool {
     let (kind, rest) = stem.split_once('_').unwrap_or((stem, ""));
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     match ending {
+        _ if AsRun::is_copy(name) || FILES.split(' ').any(|known| known == name) => true,
         "csv" | "png" | "svg" | "pdf" if kind == CURVES => true,
         "vtu" | "pvtu" => ["fields", "contact"].contains(&kind) && rest.split('_').all(is_number),
         "png" | "svg" | "pdf" | "gif" | "mp4" => {
             PICTURES.split(' ').any(|known| known == kind)
                 && (stem == kind || rest.starts_with('t'))
         }
-        _ => AsRun::is_copy(name) || FILES.split(' ').any(|known| known == name),
+        _ => false,
     }
 }
 
