@@ -14,8 +14,8 @@ use std::{path::PathBuf, process::ExitCode};
     long_version = command::version(),
     about,
     after_help = "Scenes are TOML files beside a gmsh geometry: `signorini keys` describes every key, \
-    `signorini new NAME` writes a first scene, TUTORIAL.md in geo (of the package: in \
-    /usr/share/doc/signorini/examples) goes on from there.\n\
+    `signorini new NAME` writes a first scene, TUTORIAL.md (in geo, or below \
+    /usr/share/doc/signorini) goes on from there.\n\
     Exit codes: 0 finished or stopped at ζ_*, 1 the run ended early, e.g. a solver missed its tolerance \
     (state saved), 2 bad input, 130 and 143 ended by SIGINT and SIGTERM."
 )]
