@@ -42,8 +42,7 @@ pub fn version() -> &'static str {
 /// The names of the files of PETSc, of its factors and of BLAS; they end with their versions.
 fn libraries() -> Vec<String> {
     let files = loaded(&["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"]);
-    let names = files.iter().filter_map(|file| file.rsplit('/').next());
-    names.map(str::to_owned).collect()
+    files.iter().filter_map(|file| file.rsplit('/').next()).map(str::to_owned).collect()
 }
 
 /// The files of these libraries that this process has loaded, from Linux (proc(5), maps).
