@@ -45,12 +45,10 @@ fresh() {
     rm -rf --one-file-system "$root" "$root".{changed,work} && mkdir "$root" "$root".{changed,work}
     mount -t overlay overlay -o "lowerdir=$CHROOTS/${1%-*},upperdir=$root.changed,workdir=$root.work" "$root"
     mount -t proc proc "$root/proc" && mount --rbind /dev "$root/dev" && mount --rbind /sys "$root/sys"
-    mkdir -p "$root"/root/{.rustup,.cargo/bin,.cargo/registry}
-    local folder
-    for folder in "$RUSTUP:.rustup" "$CARGO/bin:.cargo/bin"; do
-        mount --bind "${folder%:*}" "$root/root/${folder#*:}"
-        mount -o remount,ro,bind "$root/root/${folder#*:}"
-    done
+    mkdir -p "$root"/root/{.rustup,.cargo/registry}
+    mount --bind "$RUSTUP" "$root/root/.rustup" && mount -o remount,ro,bind "$root/root/.rustup"
+    # A copy, as `cargo install` adds to it.
+    cp -a "$CARGO/bin" "$root/root/.cargo"
     mount --bind "$CARGO/registry" "$root/root/.cargo/registry"
     cp /etc/resolv.conf "$root/etc/resolv.conf"
     # Networks may have certificates of their own.
