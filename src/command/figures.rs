@@ -135,7 +135,7 @@ impl<'a> LastFigures<'a> {
         place[0].is_finite().then(|| self.mesh.place(place))
     }
 
-    /// The figures of the body and of contact whose extreme in the run is another value than the last one: the label, the
+    /// The extremes in the run of figures of the body and of contact, where they differ from the last values: the label, the
     /// extreme and its time.
     pub(super) fn governing(&self) -> impl Iterator<Item = (&str, String, f64)> {
         // A lone foundation has the pressure of the whole.

@@ -122,7 +122,8 @@ impl Outcome {
         let now = self.set_scales(problem, measured);
         let none = (DVector::zeros(self.last.state.zeta.len()), 0.0);
         let of_steps = self.errors.bars_of_steps.as_ref().unwrap_or(&none);
-        problem.add_step_errors(&mut self.bars, &now, &self.last.state, of_steps)?;
+        let last = (&self.last.state, &self.last.figures[..]);
+        problem.add_step_errors(&mut self.bars, &now, last, of_steps)?;
         problem.join_bars(&mut self.bars, &self.last.figures);
         Ok(())
     }

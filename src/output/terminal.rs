@@ -102,7 +102,7 @@ impl Progress {
     }
 }
 
-/// The first fields in a line of at most so many `columns`; always the first one.
+/// As many of the fields, from the first one, as fit into a line of `columns`. The first field is there in any case.
 pub fn fitting(fields: &[String], columns: usize) -> String {
     let lengths = (0..fields.len()).map(|i| fields[..=i].join("  ").chars().count());
     let count = lengths.take_while(|length| *length <= columns).count();

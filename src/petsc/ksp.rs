@@ -161,7 +161,8 @@ impl Ksp {
         let pc = self.pc()?;
         let mut reason = raw::PCFailedReason::PC_NOERROR;
         let (mut factor, mut package, mut negative) = (ptr::null_mut(), ptr::null(), 0);
-        // MatMumpsGetInfog, as its factors have it: a PETSc without MUMPS may not have the function.
+        // The function MatMumpsGetInfog, by the name under which factors of MUMPS register it: a PETSc without MUMPS need not
+        // have it.
         type Infog = unsafe extern "C" fn(raw::Mat, c_int, *mut c_int) -> raw::PetscErrorCode;
         let (mut infog, name) = (None::<Infog>, c"MatMumpsGetInfog_C".as_ptr());
         // SAFETY: a live handle; the package's name is a constant of PETSc; the function has this type.

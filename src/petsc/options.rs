@@ -6,7 +6,7 @@ use std::{
     ptr,
 };
 
-/// A truth value of PETSc: an enumeration up to PETSc 3.23, C's `bool` later.
+/// A truth value of PETSc: an enumeration in PETSc 3.22, C's `bool` in 3.25.
 pub(super) fn petsc_bool<T: From<bool>>(value: bool) -> T {
     value.into()
 }

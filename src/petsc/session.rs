@@ -1,12 +1,8 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, check,
-    error::keep_message,
-    handle::OPEN_HANDLES,
-    options,
-    options::{c_string, is_true, petsc_bool},
-    raw, shell_preconditioner,
+    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
+    options::c_string, raw, shell_preconditioner,
 };
 use crate::memory::address_space;
 use std::{
@@ -50,10 +46,10 @@ impl Session {
             raw::omp_set_max_active_levels(0);
             raw::mallopt(raw::M_ARENA_MAX, 1);
         }
-        let mut running = petsc_bool(false);
+        let mut running = options::petsc_bool(false);
         // SAFETY: PetscInitialized may be called at any time.
         check(unsafe { raw::PetscInitialized(&mut running) })?;
-        if !is_true(running) {
+        if !options::is_true(running) {
             PetscError::if_short(BUFFER + MPI - address_space(), "to start (ulimit -v)")?;
             initialize(options)?;
             PetscError::if_short(BUFFER - address_space(), "to start (ulimit -v)")?;
@@ -79,7 +75,7 @@ impl Session {
     pub fn finalize(self) -> Result<(), PetscError> {
         match OPEN_HANDLES.load(Ordering::Relaxed) {
             0 => {
-                // PETSc would list the unused options, as the caller does.
+                // The caller lists the unused options; PETSc would do so again.
                 options::set_default_option("-options_left", "0")?;
                 // SAFETY: no object of PETSc is in use any more.
                 check(unsafe { raw::PetscFinalize() })
@@ -103,8 +99,8 @@ const SINGLETON: [(&str, &str); 6] = [
     ("OMPI_MCA_orte_create_session_dirs", "0"),
 ];
 
-/// Sets the environment variables that the user has not set, or that name no folder where the value does. Returns them as
-/// they were.
+/// Sets environment variables, except those that the user has set; but a folder that does not exist is replaced. Returns
+/// the old values of what it has set.
 fn set_missing(variables: &[(&'static str, &str)]) -> Vec<(&'static str, Option<OsString>)> {
     let serves = |old: &OsString, value: &str| !value.starts_with('/') || Path::new(old).is_dir();
     let all = variables.iter().map(|&(name, value)| (name, value, env::var_os(name)));

@@ -34,6 +34,17 @@ fn bar(bars: &[Bar], name: &str) -> f64 {
     bars.iter().find(|bar| bar.name == name).unwrap_or_else(|| panic!("no bar of {name}")).bar
 }
 
+/// A scene on n × n cells of the square, solved with error bars.
+fn with_bars(scene: &Scene, n: usize) -> (DiscreteProblem, Outcome) {
+    let problem = DiscreteProblem::new(scene.clone(), square(n)).unwrap();
+    let mut outcome = solved(scene.clone(), square(n));
+    let session = Session::start(&[]).unwrap();
+    let measured =
+        estimate::measured_errors(&session, scene, &square(n), SOLVERS[0], None).unwrap();
+    outcome.set_bars(&problem, &measured).expect("PETSc works");
+    (problem, outcome)
+}
+
 #[test]
 fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one() {
     // The corner of the clamp on the foundation makes figures converge slowly, in both orders.
@@ -142,12 +153,7 @@ fn a_force_that_statics_determines_is_off_by_no_more_than_its_bar_wherever_a_loa
                  material = {{ young = 1000, poisson = 0.3, plane = 'stress' }}
                  boundary = [{{ name = 'bottom', displacement = [0, 0] }}, {{ name = 'top', {load} }}]"
             ));
-            let problem = DiscreteProblem::new(scene.clone(), square(3)).unwrap();
-            let mut outcome = solved(scene.clone(), square(3));
-            let session = Session::start(&[]).unwrap();
-            let measured =
-                estimate::measured_errors(&session, &scene, &square(3), SOLVERS[0], None).unwrap();
-            outcome.set_bars(&problem, &measured).expect("PETSc works");
+            let (problem, outcome) = with_bars(&scene, 3);
             let error =
                 (crate::support::figures(&problem, &outcome.last)["bottom.force_y"] - force).abs();
             let bar = bar(&outcome.bars, "bottom.force_y");
@@ -171,12 +177,7 @@ fn a_foundation_that_comes_from_far_away_leaves_the_bars_as_they_are() {
              boundary = [{{ name = 'top', displacement = [0, 0] }},
                          {{ name = 'bottom', gap = '{far}*(1 - t)^4 - 0.01*t' }}]"
         ));
-        let problem = DiscreteProblem::new(scene.clone(), square(4)).unwrap();
-        let mut outcome = solved(scene.clone(), square(4));
-        let session = Session::start(&[]).unwrap();
-        let measured =
-            estimate::measured_errors(&session, &scene, &square(4), SOLVERS[0], None).unwrap();
-        outcome.set_bars(&problem, &measured).expect("PETSc works");
+        let (problem, outcome) = with_bars(&scene, 4);
         let travel = crate::support::figures(&problem, &outcome.last)["bottom.travel"];
         assert!((travel - far - 0.01).abs() < 1e-12, "{travel}");
         assert!(outcome.bars.iter().all(|bar| bar.name != "bottom.travel"));

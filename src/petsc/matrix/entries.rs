@@ -1,12 +1,7 @@
 //! Reading and writing the stored entries of a matrix in place.
 
 use super::{Matrix, Pattern};
-use crate::petsc::{
-    PetscError, Session, check,
-    options::{is_true, petsc_bool},
-    raw,
-    vector::same_size,
-};
+use crate::petsc::{PetscError, Session, check, options, raw, vector::same_size};
 use std::{ptr, slice};
 
 impl Matrix {
@@ -98,12 +93,12 @@ impl Matrix {
     /// several ranks the first block has the columns that this rank owns, the second the other columns.
     fn blocks(&self) -> Result<Vec<(raw::Mat, usize)>, PetscError> {
         let (mut own, mut others) = (self.stored(), ptr::null_mut());
-        let (mut parallel, columns) = (petsc_bool(false), ptr::null_mut());
+        let (mut parallel, columns) = (options::petsc_bool(false), ptr::null_mut());
         let (object, kind) = (self.stored().cast(), c"mpiaij".as_ptr());
         // SAFETY: a live handle, which keeps its blocks.
         unsafe {
             check(raw::PetscObjectTypeCompare(object, kind, &mut parallel))?;
-            if is_true(parallel) {
+            if options::is_true(parallel) {
                 check(raw::MatMPIAIJGetSeqAIJ(self.stored(), &mut own, &mut others, columns))?;
             }
         }

@@ -3,8 +3,7 @@
 
 use super::Matrix;
 use crate::petsc::{
-    PetscError, Vector, check, error::return_code, handle::Handle, options::petsc_bool, raw,
-    session::world,
+    PetscError, Vector, check, error::return_code, handle::Handle, options, raw, session::world,
 };
 use std::{cell::Cell, ffi::c_void, mem::transmute, ptr, rc::Rc};
 
@@ -56,7 +55,7 @@ impl Matrix {
             let function = Some(transmute::<Product, unsafe extern "C" fn()>(multiply));
             check(raw::MatShellSetOperation(handle.raw(), product, function))?;
             for option in [raw::MatOption::MAT_SYMMETRIC, raw::MatOption::MAT_SYMMETRY_ETERNAL] {
-                check(raw::MatSetOption(handle.raw(), option, petsc_bool(true)))?;
+                check(raw::MatSetOption(handle.raw(), option, options::petsc_bool(true)))?;
             }
             handle
         };

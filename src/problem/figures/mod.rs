@@ -152,7 +152,7 @@ impl Figure {
     }
 }
 
-/// The names of what has figures of its own in a scene.
+/// The parts of a scene that have figures of their own, by their names.
 #[derive(Default)]
 pub(crate) struct Parts<'a> {
     /// The materials, if there are several.

@@ -156,28 +156,31 @@ impl DiscreteProblem {
         values
     }
 
-    /// The most by which each figure changes if ζ changes by up to `bar` and u does not. Collective.
+    /// How much each figure of `state`, with these `values`, changes when ζ changes by ±`bar` while u stays: the larger one of
+    /// both changes. Collective.
     ///
     /// # Errors
     /// PETSc failed.
-    fn changes(&self, state: &State, bar: &DVector<f64>) -> Result<Vec<f64>, PetscError> {
-        let values = |sign: f64| {
-            let zeta = state.zeta.iter().zip(bar).map(|(zeta, bar)| zeta + sign * bar);
-            let (state, zero) =
-                (State { zeta: zeta.collect(), ..state.clone() }, vec![0.0; state.u.len()]);
-            Ok(self.figures.values(&Observation::new(self, &state, &zero, &zero)?))
-        };
-        let [low, own, high] = [values(-1.0)?, values(0.0)?, values(1.0)?];
-        let all = low.iter().zip(&own).zip(&high);
-        let most = |((a, b), c): ((&Value, &Value), &Value)| {
-            (b.value - a.value).abs().max((c.value - b.value).abs())
-        };
-        Ok(all.map(most).collect())
+    fn changes(
+        &self,
+        (state, values): (&State, &[Value]),
+        bar: &DVector<f64>,
+    ) -> Result<Vec<f64>, PetscError> {
+        let (mut largest, zero) = (vec![0.0; values.len()], vec![0.0; state.u.len()]);
+        for sign in [-1.0, 1.0] {
+            let zeta = state.zeta.iter().zip(bar).map(|(zeta, bar)| zeta + sign * bar).collect();
+            let state = State { zeta, ..state.clone() };
+            let changed = self.figures.values(&Observation::new(self, &state, &zero, &zero)?);
+            for ((largest, own), other) in largest.iter_mut().zip(values).zip(changed) {
+                *largest = f64::max(*largest, (other.value - own.value).abs());
+            }
+        }
+        Ok(largest)
     }
 
     /// Adds to the error bars the solver's tolerance and the errors of the loads' integrals, which all meshes
-    /// of a measurement may have, and of the time steps: `of_steps` are the error bars of ζ at the vertices in the last
-    /// `state`, and of u, relative, in the energy norm. Collective.
+    /// of a measurement may have, and of the time steps: `of_steps` are the error bars of ζ at the vertices in the `last`
+    /// state, and of u, relative, in the energy norm; the state comes with the values of its figures. Collective.
     ///
     /// u depends on the past, and so on the steps, only through ζ: their errors are relative to the scales `now`, in the last
     /// state.
@@ -188,14 +191,15 @@ impl DiscreteProblem {
         &self,
         bars: &mut [Bar],
         now: &[f64],
-        state: &State,
-        (bar, displacement): &(DVector<f64>, f64),
+        last: (&State, &[Value]),
+        of_steps: &(DVector<f64>, f64),
     ) -> Result<(), PetscError> {
         let [force, of_loads] =
             self.loads.integral_errors(&self.body, &self.scene().sample_times(SAMPLE_TIMES));
         let lever =
             self.body.radius_of_gyration() + self.body.centroid[0].hypot(self.body.centroid[1]);
-        let changes = self.changes(state, bar)?;
+        let (bar, displacement) = of_steps;
+        let changes = self.changes(last, bar)?;
         let zeta = self.body.vertices.partition.min_max(bar.as_slice()).1.min(1.0);
         for (bar, now) in bars.iter_mut().zip(now) {
             let Some(number) = self.figures.number(&bar.name) else { continue };
