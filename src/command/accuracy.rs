@@ -2,8 +2,8 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    estimate::{self, AdaptError, Adapted, Measured},
-    evolution::{AIM, Outcome, percent},
+    estimate::{self, AdaptError, Adapted, Extreme, Measured},
+    evolution::{AIM, Outcome, Step, percent},
     interrupt::Signal,
     mesh::{Mesh, Order},
     petsc::Session,
@@ -148,6 +148,17 @@ pub(super) fn missing_bars(task: &Task, outcome: &Outcome) -> Option<String> {
     (is_missing && task.measured.stop.is_some()).then(|| {
         "no error bars: with few time steps, or on a finer mesh, the run stops at ζ_*".to_owned()
     })
+}
+
+/// A note on a sound body with a singular stress. On finer meshes this stress grows and may exceed the threshold of the damage,
+/// which no error bar tells.
+pub(super) fn hidden_damage(task: &Task, last: &Step, extremes: &[Extreme]) -> Option<String> {
+    let is_sound = task.problem.damage().is_some() && last.record.zeta_min == 1.0;
+    let point = extremes.iter().find_map(|of| of.singular.as_ref()).filter(|_| is_sound)?;
+    Some(format!(
+        "no damage on this mesh, but the stress is singular at {point}: on finer ones it may exceed the threshold of \
+         the damage there, which the error bars do not contain"
+    ))
 }
 
 /// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve

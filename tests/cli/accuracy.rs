@@ -137,6 +137,30 @@ fn a_stress_that_is_zero_needs_no_finer_mesh_and_a_singular_one_is_told() {
     assert!(said.out.contains(told), "{}", said.out);
 }
 
+/// Below its threshold λ_W the damage rests. A singular stress exceeds every threshold on a mesh that is fine enough, a
+/// uniform one on none.
+#[test]
+fn a_sound_body_with_a_singular_stress_is_told_and_no_other() {
+    let directory = TestDirectory::new();
+    let damage = |threshold: f64| {
+        format!(
+            "damage = {{ diffusion = 0.01, lambda_d = 0, lambda_u = 1, lambda_w = {threshold} }}
+             time = {{ end = 1, step = 0.5 }}"
+        )
+    };
+    let pulled = PUSHED.replace("displacement = [0, 0]", "displacement = ['free', 0]");
+    let pulled =
+        pulled.replace("name = 'left', traction = [1, 0]", "name = 'top', traction = [0, 1]");
+    for (scene, threshold, told) in
+        [(PUSHED, 10.0, true), (PUSHED, 0.0, false), (&pulled, 10.0, false)]
+    {
+        directory.write("scene.toml", &format!("{scene}\n{}", damage(threshold)));
+        let said = directory.run(&[]);
+        let note = "no damage on this mesh, but the stress is singular";
+        assert_eq!(said.out.contains(note), told, "{scene}, {threshold}: {}", said.out);
+    }
+}
+
 /// Between the chords of a coarse mesh and their arcs, a point lies in the curved triangles of the fibre, whose stress is nearly
 /// uniform; the chords leave it to the plate.
 #[test]
