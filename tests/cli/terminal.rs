@@ -56,9 +56,12 @@ fn colours_are_optional() {
     let has_colours = |variable: &str, arguments: &str| {
         let mut command = Command::new("script");
         command.args(["-qec", &format!("{variable} '{program}' {arguments}"), "/dev/null"]);
-        let output =
-            command.env("TERM", "xterm").env_remove("NO_COLOR").current_dir(directory.path("."));
-        let text = output.output().expect("script(1)").stdout;
+        // These variables decide on colours as well; continuous integration, for one, sets CI.
+        for other in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE", "CI"] {
+            command.env_remove(other);
+        }
+        let output = command.env("TERM", "xterm").current_dir(directory.path(".")).output();
+        let text = output.expect("script(1)").stdout;
         let text = String::from_utf8_lossy(&text).into_owned();
         // "Select graphic rendition": ESC [ numbers m.
         let mut codes = text.split("\x1b[").skip(1);
