@@ -7,10 +7,11 @@
 //!
 //! ```
 //! use signorini::{
-//!     estimate,
-//!     evolution::{DiscreteProblem, Phases},
+//!     estimate::Simulation,
+//!     evolution::Step,
 //!     mesh::Mesh,
 //!     petsc::Session,
+//!     problem::DiscreteProblem,
 //!     scene::Scene,
 //! };
 //!
@@ -23,11 +24,11 @@
 //! // Scene::read("file.toml") and mesh::load(&scene.mesh.file, …) read files.
 //! let problem = DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8))?;
 //! let session = Session::start(&[])?;
-//! let phases = Phases::default();
-//! let outcome = estimate::run(&session, &problem, "active-set", &phases, &mut |step| {
+//! let mut show = |step: &Step| {
 //!     println!("t = {}: largest |u| = {}", step.record.time, step.record.displacement_max);
 //!     Ok(())
-//! })?;
+//! };
+//! let outcome = Simulation::new(&problem).observer(&mut show).run(&session)?;
 //! let force = outcome.last.record.contact_force;
 //! assert!((force - 500.0).abs() < 1e-6, "contact balances the pressure");
 //! println!("error of u: {:.1} %", 100.0 * outcome.errors.displacement_mesh);
@@ -35,7 +36,8 @@
 //! # }
 //! ```
 //!
-//! How to write a contact solver: [`contact::ContactSolver`].
+//! Contact solvers ([`contact::ContactSolver`]) and damage sources ([`model::DamageSource`]) of other authors run in the same
+//! loop, see `examples/own_solver.rs` and `examples/own_law.rs`. Vectors and matrices are those of [`nalgebra`].
 //!
 //! # The problem
 //!
@@ -73,6 +75,8 @@
 //!
 //! The modules below are listed in the order of their dependence: each uses only those above it.
 #![deny(unsafe_code)]
+
+pub use nalgebra;
 
 pub mod interrupt;
 pub mod memory;

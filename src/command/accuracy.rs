@@ -3,7 +3,7 @@
 use super::{Failure, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Extreme, Measured},
-    evolution::{AIM, Outcome, Step, percent},
+    evolution::{AIM, Choices, Outcome, Step, percent},
     interrupt::Signal,
     mesh::{Mesh, Order},
     petsc::Session,
@@ -19,7 +19,6 @@ pub(super) fn adapt(
     session: &Session,
     scene: &mut Scene,
     mesh: &Mesh,
-    solver: &str,
     made: Option<Adapted>,
 ) -> Result<Option<Adapted>, Failure> {
     let Some(accuracy) = scene.accuracy else { return Ok(None) };
@@ -34,7 +33,8 @@ pub(super) fn adapt(
             is_first = false;
         }
     };
-    let adapt = || estimate::adapted(session, scene, mesh.clone(), solver, accuracy, &mut show);
+    let choices = Choices::of(scene);
+    let adapt = || estimate::adapted(session, scene, mesh.clone(), &choices, accuracy, &mut show);
     let adapted = made.map_or_else(adapt, Ok);
     let adapted = adapted.map_err(|error| match error {
         AdaptError::Setup(_) | AdaptError::Overturns { .. } => Failure::input(error),
@@ -52,7 +52,6 @@ pub(super) fn measure_errors(
     session: &Session,
     scene: &Scene,
     mesh: &Mesh,
-    solver: &str,
     of_steps: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Measured, Failure> {
@@ -63,7 +62,7 @@ pub(super) fn measure_errors(
         );
         return Ok(Measured::default());
     }
-    match estimate::measured_errors(session, scene, mesh, solver, of_steps) {
+    match estimate::measured_errors(session, scene, mesh, &Choices::of(scene), of_steps) {
         Ok(measured) => Ok(measured),
         // The scene fits this mesh, perhaps not the finer one.
         Err(error) => match error.signal() {
@@ -88,8 +87,7 @@ pub(super) fn confirm_stop(
     };
     let scene = task.problem.scene();
     let of_steps = scene.damage.as_ref().map(|damage| 0.5 * damage.law.threshold);
-    let (mesh, solver, notes) = (&adapted.mesh, &task.solver, &mut task.notes);
-    let measured = measure_errors(session, scene, mesh, solver, of_steps, notes)?;
+    let measured = measure_errors(session, scene, &adapted.mesh, of_steps, &mut task.notes)?;
     if measured.stop.is_some() {
         task.measured = measured;
     }

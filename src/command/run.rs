@@ -15,7 +15,7 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    estimate::{self, Measured},
+    estimate::{Measured, Simulation},
     evolution::{Outcome, Phases, RunError},
     interrupt::Interrupts,
     linear::LinearSolver,
@@ -163,7 +163,6 @@ fn read<'a>(
     let comm = session.comm();
     let (mut scene, mut notes) = agree(comm, arguments.read())?;
     let mesh = phases.time("mesh", || read_shared(comm, &scene))?;
-    let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
     let folder = arguments.folder(&scene);
     let as_run = scene.as_run();
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
@@ -176,10 +175,10 @@ fn read<'a>(
     }
     let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
     let _interrupts = Interrupts::defer();
-    let adapt = || adapt(session, &mut scene, &mesh, &solver, made);
+    let adapt = || adapt(session, &mut scene, &mesh, made);
     let adapted = agree(comm, phases.time("adaptation", adapt))?;
     let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
-    let measure = || measure_errors(session, &scene, &mesh, &solver, None, &mut notes);
+    let measure = || measure_errors(session, &scene, &mesh, None, &mut notes);
     let measured = match &adapted {
         Some(adapted) => adapted.measured.clone(),
         None if arguments.bars => agree(comm, phases.time("error bars", measure))?,
@@ -199,7 +198,6 @@ fn read<'a>(
         triangles: comm.count(problem.body.own_triangles),
         contact_nodes: comm.count(contact_nodes(&problem)),
         problem,
-        solver,
         folder,
         as_run,
         adapted,
@@ -271,9 +269,11 @@ fn solve_once<'a>(
     let (problem, phases) = (&task.problem, task.phases);
     let resumed = restart.as_ref().map_or(Ok(()), |checkpoint| recorder.resume(checkpoint));
     agree(comm, resumed.map_err(Failure::from))?;
-    let saved = restart.map(|checkpoint| checkpoint.run);
-    let mut result =
-        estimate::run_from(session, problem, &task.solver, phases, &mut recorder, saved);
+    let mut simulation = Simulation::new(problem).phases(phases).observer(&mut recorder);
+    if let Some(checkpoint) = restart {
+        simulation = simulation.resume(checkpoint.run);
+    }
+    let mut result = simulation.run(session);
     if let Ok(outcome) = &mut result {
         outcome.set_bars(problem, &task.measured)?;
     }

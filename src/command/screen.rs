@@ -30,9 +30,10 @@ pub fn open(task: &Task) -> Progress {
     } else if partition.total() >= MANY_NODES && cores() > 1 {
         mesh += ", on one core (several: mpiexec -n 2 signorini run …)";
     }
+    let solver = scene.contact.solver_name();
     let solver = match task.contact_nodes {
-        0 => format!("{} (no contact: one linear solve a step)", task.solver),
-        _ => task.solver.clone(),
+        0 => format!("{solver} (no contact: one linear solve a step)"),
+        _ => solver.to_owned(),
     };
     let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
     let steps = |grid| steps(grid, &scene.units.time, task.problem.damage().is_some());

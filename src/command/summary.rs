@@ -17,7 +17,7 @@ pub(super) fn summary(
     notes: &[String],
     [wall, memory]: [f64; 2],
 ) -> Value {
-    let Task { problem, triangles, contact_nodes, solver, .. } = task;
+    let Task { problem, triangles, contact_nodes, .. } = task;
     let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
     let outcome = result.ok();
     let steps = last.map_or(0, |record| record.step);
@@ -26,7 +26,7 @@ pub(super) fn summary(
         "provenance": provenance(problem.mesh().gmsh.as_deref()),
         "scene": scene.name,
         "title": scene.title,
-        "solver": solver,
+        "solver": problem.scene().contact.solver_name(),
         "ranks": partition.comm().size(),
         // Numbers of the whole body. Contact nodes have a gap condition and no prescribed displacement.
         "nodes": partition.total(),

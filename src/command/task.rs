@@ -16,8 +16,6 @@ pub struct Task<'a> {
     /// The numbers of triangles and of nodes with a gap condition of the whole body.
     pub triangles: usize,
     pub contact_nodes: usize,
-    /// The name of the contact solver.
-    pub solver: String,
     /// The folder of the results.
     pub folder: PathBuf,
     /// The scene file in this folder.

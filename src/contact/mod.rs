@@ -27,6 +27,7 @@ pub use problem::ContactProblem;
 pub use rigid::{DrivenMotion, RigidMotions, nonnegative};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};
 pub use solvers::{
-    Anderson, BoxedSolver, ContactOptions, ContactReport, ContactSolver, PREFIX as ELASTIC,
-    PenaltyOptions, REGISTRY, SOLVERS, SolverEntry, SolverError, TAO_TYPES, find, solvers,
+    Anderson, ChosenSolver, ContactOptions, ContactReport, ContactSolver, PREFIX as ELASTIC,
+    PenaltyOptions, REGISTRY, SOLVERS, SharedSolver, SolverEntry, SolverError, TAO_TYPES, find,
+    solvers,
 };

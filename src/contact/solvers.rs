@@ -20,65 +20,17 @@ use crate::{
 };
 use active_set::ActiveSet;
 use serde::Deserialize;
+use std::rc::Rc;
 
 /// The prefix of PETSc options for linear systems with K.
 pub const PREFIX: &str = "elastic_";
 
 /// A method for the contact problem. It keeps nothing between solves.
 ///
-/// To write one, implement this trait in a file of `src/contact/solvers` and add it to [`REGISTRY`]: the command
-/// line, `compare` and the tests then know it, and the certificate checks its answers. This one relaxes each unknown
-/// in turn, cut to its bounds (projected Gauss–Seidel), on one rank, for bodies that are held:
-///
-/// ```
-/// use signorini::{
-///     contact::{ContactError, ContactProblem, ContactReport, ContactSolver},
-///     linear::LinearSolver,
-///     petsc::Vector,
-/// };
-///
-/// struct GaussSeidel;
-///
-/// impl ContactSolver for GaussSeidel {
-///     fn name(&self) -> &'static str {
-///         "gauss-seidel"
-///     }
-///
-///     fn solve(
-///         &self,
-///         problem: &ContactProblem,
-///         _elastic: &mut LinearSolver, // solves K x = r by PETSc's KSP, where a method needs it
-///         _warm: &mut Vec<f64>,
-///         c: &mut Vector,
-///     ) -> Result<ContactReport, ContactError> {
-///         let load = problem.load.read(<[f64]>::to_vec)?;
-///         let (mut x, mut report) = (c.read(<[f64]>::to_vec)?, ContactReport::default());
-///         let mut bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; x.len()];
-///         problem.bounds.iter().for_each(|bound| bounds[bound.dof] = [bound.lower, bound.upper]);
-///         while report.iterations < 100_000 {
-///             report.iterations += 1;
-///             for i in 0..x.len() {
-///                 // Row i of K: r = f_i − Σ K_ij x_j.
-///                 let (r, diagonal) = problem.stiffness.read_row(i as i32, |columns, values| {
-///                     let row = columns.iter().zip(values);
-///                     row.fold((load[i], 0.0), |(r, d), (&j, k)| {
-///                         let j = j as usize;
-///                         (r - k * x[j], if j == i { *k } else { d })
-///                     })
-///                 })?;
-///                 x[i] = (x[i] + r / diagonal).clamp(bounds[i][0], bounds[i][1]);
-///             }
-///             c.set(&x)?;
-///             let residuals = problem.residuals(c)?; // print them to see how a method converges
-///             if residuals.worst() <= problem.tolerance {
-///                 return Ok(report);
-///             }
-///         }
-///         let residuals = problem.residuals(c)?;
-///         Err(ContactError::stopped(self.name(), report, residuals, "too many iterations"))
-///     }
-/// }
-/// ```
+/// To write one in a crate of your own, implement this trait and hand it to a
+/// [`Simulation`](crate::estimate::Simulation): the certificate checks its answers, and bars, accuracy and restart work
+/// as with ours; `examples/own_solver.rs` does so. A solver of this crate is a file of `src/contact/solvers` and a line of
+/// [`REGISTRY`]: the command line, `compare` and the tests then know it.
 pub trait ContactSolver {
     /// Its name in a scene and for `--solver`.
     fn name(&self) -> &'static str;
@@ -98,8 +50,17 @@ pub trait ContactSolver {
     ) -> Result<ContactReport, ContactError>;
 }
 
-/// A contact solver.
-pub type BoxedSolver = Box<dyn ContactSolver>;
+/// A contact solver that several runs share.
+pub type SharedSolver = Rc<dyn ContactSolver>;
+
+/// The contact solver of a run: a name of [`REGISTRY`], perhaps with a variant, or a solver of another author.
+#[derive(Clone)]
+pub enum ChosenSolver {
+    /// By its name.
+    Named(String),
+    /// Of another author.
+    Own(SharedSolver),
+}
 
 /// The cost of a contact solve.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -166,7 +127,7 @@ pub struct SolverEntry {
     /// The solver that replaces it if it stops above the tolerance.
     pub rescuer: Option<&'static str>,
     /// Makes a solver; the text is the variant, or empty.
-    pub construct: fn(&str, &ContactOptions) -> BoxedSolver,
+    pub construct: fn(&str, &ContactOptions) -> SharedSolver,
 }
 
 /// All contact solvers, the default first.
@@ -206,6 +167,13 @@ pub struct ContactOptions {
     pub penalty_duality: PenaltyOptions,
 }
 
+impl ContactOptions {
+    /// The name of the solver: the one asked for, or the default.
+    pub fn solver_name(&self) -> &str {
+        self.solver.as_deref().unwrap_or(SOLVERS[0])
+    }
+}
+
 impl Default for ContactOptions {
     fn default() -> Self {
         let penalty_duality = PenaltyOptions::default();
@@ -235,23 +203,27 @@ fn names() -> Vec<String> {
     REGISTRY.iter().flat_map(of).collect()
 }
 
-/// The solver `name`, and the solver that replaces it if it stops above the tolerance. A variant has no
-/// replacement, so that its own result is seen, and `rescue = false` forbids one. Without bounds every name
-/// means one linear solve, by the active set method.
+/// The chosen solver, and the one that replaces it if it stops above the tolerance: for a solver of another author
+/// the default one. A variant has no replacement, so that its own result is seen, and `rescue = false` forbids one.
+/// Without bounds every choice means one linear solve, by the active set method.
 ///
 /// # Errors
 /// There is none of that name.
 pub fn solvers(
-    name: &str,
+    chosen: &ChosenSolver,
     bounded: bool,
     options: &ContactOptions,
-) -> Result<(BoxedSolver, Option<BoxedSolver>), SolverError> {
-    let (entry, variant) = find(name)?;
+) -> Result<(SharedSolver, Option<SharedSolver>), SolverError> {
+    let named = |name| find(name).map(|(entry, variant)| (entry.construct)(variant, options));
+    let (solver, rescuer) = match chosen {
+        ChosenSolver::Own(solver) => (Rc::clone(solver), Some(SOLVERS[0])),
+        ChosenSolver::Named(name) => {
+            let (entry, variant) = find(name)?;
+            (named(name)?, entry.rescuer.filter(|_| variant.is_empty()))
+        }
+    };
     if !bounded {
-        return Ok((Box::new(ActiveSet { name: "linear" }), None));
+        return Ok((Rc::new(ActiveSet { name: "linear" }), None));
     }
-    let rescuer = entry.rescuer.filter(|_| options.rescue && variant.is_empty());
-    let rescuer = rescuer.map(find).transpose()?;
-    let construct = |entry: &SolverEntry, variant| (entry.construct)(variant, options);
-    Ok((construct(entry, variant), rescuer.map(|(entry, variant)| construct(entry, variant))))
+    Ok((solver, rescuer.filter(|_| options.rescue).map(named).transpose()?))
 }

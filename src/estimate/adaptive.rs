@@ -26,7 +26,7 @@ mod sequence;
 mod sizes;
 
 use crate::{
-    evolution::RunError,
+    evolution::{Choices, RunError},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     petsc::{PetscError, Session},
@@ -144,7 +144,7 @@ pub fn adapted(
     session: &Session,
     scene: &Scene,
     mesh: Mesh,
-    solver: &str,
+    choices: &Choices,
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
@@ -155,7 +155,7 @@ pub fn adapted(
         .for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
     let scene = with_passing_loads(session, few_steps, &mesh, accuracy)?;
     let mut reached = None;
-    let refined = refined(session, scene, mesh, solver, accuracy, &mut |mesh| {
+    let refined = refined(session, scene, mesh, choices, accuracy, &mut |mesh| {
         seen(mesh);
         reached = Some(mesh.clone());
     });
@@ -199,7 +199,7 @@ pub fn measured_errors(
     session: &Session,
     scene: &Scene,
     mesh: &Mesh,
-    solver: &str,
+    choices: &Choices,
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
     let mut few_steps = scene.clone();
@@ -218,12 +218,12 @@ pub fn measured_errors(
     let triangles = mesh.triangles.len();
     loop {
         let problem = DiscreteProblem::new(few_steps.clone(), mesh.clone())?.restrict(session)?;
-        let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, &[]);
+        let run = || FewStepRun::run(session, &problem, choices, triangles, FEW, &[]);
         let run = limits.measure(triangles, run);
         let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
         if !repeats || !make_steps_adaptive(&mut few_steps, FEW_STEP_TOLERANCE) {
-            let new = Measurement::new(session, &mesh, &run, solver, &[], None, &mut limits);
+            let new = Measurement::new(session, &mesh, &run, choices, &[], None, &mut limits);
             return Ok(new?.result());
         }
     }
@@ -236,7 +236,7 @@ fn refined(
     session: &Session,
     mut scene: Scene,
     mesh: Mesh,
-    solver: &str,
+    choices: &Choices,
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
@@ -249,7 +249,7 @@ fn refined(
         let mesh = &refinement.mesh;
         let triangles = mesh.triangles.len();
         let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
-        let run = || FewStepRun::run(session, &problem, solver, triangles, INSTANTS, &[]);
+        let run = || FewStepRun::run(session, &problem, choices, triangles, INSTANTS, &[]);
         let run = limits.measure(triangles, run);
         let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
         if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
@@ -264,7 +264,7 @@ fn refined(
                 return Ok(Err(limit));
             }
             let (run, accuracy) = (&round.run, Some(accuracy));
-            match Measurement::new(session, mesh, run, solver, &before, accuracy, limits) {
+            match Measurement::new(session, mesh, run, choices, &before, accuracy, limits) {
                 Ok(measured) => Ok(Ok(progress.measured(triangles, measured))),
                 Err(error) if error.signal().is_some() => Err(error),
                 Err(error) => Ok(Err(error.to_string())),

@@ -11,7 +11,7 @@
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
 //! bisection. A measurement ends the rounds.
 //!
-//! What crosses the door: [`run`] calls `evolution`, takes its last state, some earlier states and its factor of K,
+//! What crosses the door: a [`Simulation`] calls `evolution`, takes its last state, some earlier states and its factor of K,
 //! and returns the [`Outcome`] with the estimates. `command` requests this, an adapted mesh and error bars. Nothing
 //! here changes the answer of a run.
 
@@ -19,55 +19,24 @@ mod recovery;
 mod extremes;
 mod error_budget;
 mod adaptive;
+mod simulation;
 
 pub use adaptive::{
     AdaptError, Adapted, INSTANTS, Measured, adapted, first_mesh, kinks, measured_errors,
 };
 pub use extremes::{Extreme, Extremes};
 pub use recovery::{EnergyError, RecoveredStrains};
+pub use simulation::Simulation;
 
 use crate::{
-    evolution::{
-        Callback, ErrorBudget, Observed, Observer, Outcome, Phases, Run, RunError, RunState, Step,
-        all_steps,
-    },
-    petsc::{PetscError, Session},
+    evolution::{ErrorBudget, Outcome, Run, RunError},
+    petsc::PetscError,
     problem::{Bar, DiscreteProblem},
 };
 use nalgebra::DVector;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
-
-/// Solves Problem VP^hk with the contact solver called `solver`, and estimates the errors of the answer at the end.
-/// `accepted` is called for every accepted step.
-///
-/// # Errors
-/// See [`RunError`]; every accepted step has been seen by then.
-pub fn run(
-    session: &Session,
-    problem: &DiscreteProblem,
-    solver: &str,
-    phases: &Phases,
-    accepted: &mut dyn FnMut(&Step) -> Observed,
-) -> Result<Outcome, RunError> {
-    run_from(session, problem, solver, phases, &mut Callback(accepted), None)
-}
-
-/// As [`run`], with an `observer` that may keep checkpoints and end the run. It starts from `saved`, if given.
-///
-/// # Errors
-/// See [`RunError`]; every accepted step has been seen by then.
-pub fn run_from(
-    session: &Session,
-    problem: &DiscreteProblem,
-    solver: &str,
-    phases: &Phases,
-    observer: &mut dyn Observer,
-    saved: Option<RunState>,
-) -> Result<Outcome, RunError> {
-    estimated(all_steps(session, problem, solver, phases, observer, saved, &[])?)
-}
 
 /// Estimates the errors of a finished run and enters them in its outcome. Collective.
 fn estimated(run: Run) -> Result<Outcome, RunError> {

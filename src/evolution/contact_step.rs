@@ -27,11 +27,11 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    DiscreteProblem, LoadCase, Phases, RunError, State, Step, StepFailure, StepRecord, agreed,
-    extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, Phases, RunError, State, Step, StepFailure, StepRecord,
+    agreed, extrapolation::Extrapolation,
 };
 use crate::{
-    contact::{self, Bound, BoxedSolver, Scales},
+    contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
     petsc::{PetscError, Session, Vector},
@@ -49,9 +49,9 @@ pub struct ContactStep<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
-    solver: BoxedSolver,
+    solver: SharedSolver,
     /// The solver for steps in which `solver` stops short of the tolerance.
-    rescuer: Option<BoxedSolver>,
+    rescuer: Option<SharedSolver>,
     /// Solves the linear systems of both solvers.
     elastic: LinearSolver,
     stiffness: Stiffness,
@@ -101,14 +101,14 @@ const MIN_LOAD: f64 = 1e-6;
 const MAX_DISPLACEMENT: f64 = 1e150;
 
 impl<'a> ContactStep<'a> {
-    /// The contact step with the solver called `solver`.
+    /// The contact step with the contact solver of `choices`.
     ///
     /// # Errors
     /// There is no solver of that name, or PETSc failed.
     pub fn new(
         session: &'a Session,
         problem: &'a DiscreteProblem,
-        solver: &str,
+        choices: &Choices,
         phases: &'a Phases,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
@@ -118,7 +118,7 @@ impl<'a> ContactStep<'a> {
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());
-        let (solver, rescuer) = contact::solvers(solver, bounded, options)?;
+        let (solver, rescuer) = contact::solvers(&choices.solver, bounded, options)?;
         // A preconditioner needs only single precision, which halves the bytes to read.
         let precision = Precision::Preconditioner;
         let memory = AcceptedState {

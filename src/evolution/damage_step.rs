@@ -1,9 +1,10 @@
 //! The damage step (28): ζ_n from ζ_{n−1} and u_{n−1}.
 
-use super::{DiscreteProblem, Phases, RunError, State, StepFailure};
+use super::{DiscreteProblem, Phases, RunError, State, StepFailure, agreed};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     linear::FactorState,
+    model::{DamagePoint, DamageSource},
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
@@ -43,6 +44,7 @@ pub(crate) struct DamageStep<'a> {
     pub(crate) session: &'a Session,
     pub(crate) problem: &'a DiscreteProblem,
     pub(crate) phases: &'a Phases,
+    pub(crate) law: &'a dyn DamageSource,
     /// k and M + kκL, made by the first step that needs it.
     pub(crate) system: Option<(f64, DamageSystem)>,
     /// The factor of a checkpoint for that system.
@@ -51,7 +53,7 @@ pub(crate) struct DamageStep<'a> {
 
 /// The damage source φ(ε(u), ζ) of a state; zero without a damage law.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(crate) struct DamageSource {
+pub(crate) struct SourceLoad {
     /// b_i = ∫ φ λ_i, m²/s.
     pub(crate) load: DVector<f64>,
     /// min φ ≤ 0, 1/s.
@@ -72,18 +74,28 @@ pub(crate) struct DamageUpdate {
 pub(super) const MAX_BALANCE: f64 = 1e-10;
 
 impl DamageStep<'_> {
-    /// The damage source of a state.
-    pub(crate) fn source(&self, state: &State) -> DamageSource {
+    /// The damage source of the state after step `step`. Collective.
+    ///
+    /// # Errors
+    /// φ is positive or no number.
+    pub(crate) fn source(&self, step: usize, state: &State) -> Result<SourceLoad, RunError> {
         let (problem, body) = (self.problem, &self.problem.body);
         let Some(laws) = problem.damage() else {
-            return DamageSource { load: DVector::zeros(state.zeta.len()), min: 0.0 };
+            return Ok(SourceLoad { load: DVector::zeros(state.zeta.len()), min: 0.0 });
         };
         self.phases.time("damage source", || {
-            let phi = fem::source(body, laws, &body.strains(&state.u), &state.zeta);
-            let min = phi.iter().flatten().copied().fold(0.0, f64::min);
-            let min = body.vertices.partition.comm().min(min);
+            let comm = body.vertices.partition.comm();
+            let phi = fem::source(body, (self.law, laws), &body.strains(&state.u), &state.zeta);
+            let phi = agreed(
+                comm,
+                phi.map_err(|(phi, DamagePoint { place, zeta, .. })| {
+                    let source = StepFailure::Source { phi, place, zeta };
+                    RunError::Step { step, time: state.time, source }
+                }),
+            )?;
+            let min = comm.min(phi.iter().flatten().copied().fold(0.0, f64::min));
             let load = fem::source_load(body, problem.mass(), &phi);
-            DamageSource { load: DVector::from_vec(load), min }
+            Ok(SourceLoad { load: DVector::from_vec(load), min })
         })
     }
 

@@ -26,6 +26,7 @@
 //! What crosses the door: `command` starts a run of a [`DiscreteProblem`] with an [`Observer`], which sees every
 //! accepted [`Step`], by way of `estimate`, which enters its error estimates in the [`Outcome`].
 
+mod choices;
 mod contact_step;
 mod damage_step;
 mod error;
@@ -40,12 +41,12 @@ mod step_controller;
 pub use crate::contact::ContactPoint;
 pub use crate::phases::Phases;
 pub use crate::problem::{ContactRow, DiscreteProblem, Loads, SetupError, State, Supports};
+pub use choices::Choices;
 pub use contact_step::{Accuracy, ContactStep};
 pub(crate) use damage_step::DamageStep;
 pub use error::{RunError, StepFailure};
 pub use error_budget::{ErrorBudget, percent};
 pub use extrapolation::Extrapolation;
-pub(crate) use observer::Callback;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
 pub use state::{GoverningValue, Step, StepRecord};
@@ -62,7 +63,7 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use step_controller::{Decision, StepState};
 
-/// Solves Problem VP^hk with the contact solver called `solver`. The `observer` sees every accepted step, and may keep
+/// Solves Problem VP^hk with the `choices` of its parts. The `observer` sees every accepted step, and may keep
 /// checkpoints and end the run. It starts from `saved`, if given. Adaptive steps end at the times `followed` of another
 /// run. Everything at the end is returned, without error estimates.
 ///
@@ -71,23 +72,24 @@ use step_controller::{Decision, StepState};
 pub(crate) fn all_steps<'a>(
     session: &'a Session,
     problem: &'a DiscreteProblem,
-    solver: &str,
+    choices: &'a Choices,
     phases: &'a Phases,
     observer: &mut dyn Observer,
     saved: Option<RunState>,
     followed: &'a [f64],
 ) -> Result<Run<'a>, RunError> {
-    let damage_step = DamageStep { session, problem, phases, system: None, loaded: None };
-    let mut contact_step = ContactStep::new(session, problem, solver, phases)?;
+    let law = &*choices.source;
+    let damage_step = DamageStep { session, problem, phases, law, system: None, loaded: None };
+    let mut contact_step = ContactStep::new(session, problem, choices, phases)?;
     let (zeta, start) = (problem.initial_damage(), problem.scene().start());
     let (mut first, mut source) = Default::default();
     if saved.is_none() {
         // (27): u_0 from ζ_0.
         first = contact_step.solve(0, start, &zeta)?;
         contact_step.accept(start)?;
-        source = damage_step.source(&first.state);
+        source = damage_step.source(0, &first.state)?;
     }
-    let controller = StepController::new(problem, &zeta, source, followed);
+    let controller = StepController::new(problem, law, &zeta, source, followed);
     let outcome = Outcome::new(first, problem);
     let mut run = Run { damage_step, contact_step, controller, outcome };
     match saved {

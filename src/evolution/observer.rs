@@ -53,11 +53,9 @@ pub trait Observer {
     }
 }
 
-/// An observer that only calls a function. A deferred signal ends the run.
-pub(crate) struct Callback<'a>(pub(crate) &'a mut dyn FnMut(&Step) -> Observed);
-
-impl Observer for Callback<'_> {
+/// A function as an observer. A deferred signal ends the run.
+impl<F: FnMut(&Step) -> Observed> Observer for F {
     fn accept(&mut self, step: &Step) -> Observed<Next> {
-        (self.0)(step).map(|()| interrupt::received().map_or(Next::Step, Next::End))
+        self(step).map(|()| interrupt::received().map_or(Next::Step, Next::End))
     }
 }

@@ -4,12 +4,15 @@ use super::{Body, Nodes, Triangle, body::at_quadratic_points, element::POINTS};
 use crate::{
     linear::{Factor, LinearSolver, LinearSystem, Precision},
     mesh::Order,
-    model::DamageLaw,
+    model::{DamageLaw, DamagePoint, DamageSource},
     petsc::{Matrix, Pattern, PetscError, Session, Vector},
 };
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
-use std::rc::Rc;
+use std::{
+    cmp::Ordering::{Equal, Less},
+    rc::Rc,
+};
 
 /// How (28) integrates products with a test function λ_i: the mass M and the source load b.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -35,20 +38,36 @@ impl Mass {
 
 /// The damage source φ of (25) at three points of each triangle, 1/s: for P1 displacements at the
 /// vertices, from nodal ζ and the triangle's strain; for P2 at the quadrature points, from ζ and the strain
-/// there. `strains` are those of [`Body::strains`], `laws` those of the materials by their numbers.
-pub fn source(
+/// there. `strains` are those of [`Body::strains`], `laws` the constants of the materials by their numbers.
+///
+/// # Errors
+/// φ is positive or no number at a point. It is returned with φ.
+pub fn source<'a>(
     body: &Body,
-    laws: &[DamageLaw],
+    (source, laws): (&dyn DamageSource, &'a [DamageLaw]),
     strains: &[Vector3<f64>],
     zeta: &[f64],
-) -> Vec<[f64; 3]> {
+) -> Result<Vec<[f64; 3]>, (f64, DamagePoint<'a>)> {
     let of_triangle = |(t, nodes): (usize, &[usize; 3])| {
         let (law, vertices) = (&laws[body.material(t)], nodes.map(|node| zeta[node]));
-        let (strains, zeta) = match body.order() {
-            Order::Linear => ([strains[t]; 3], vertices),
-            Order::Quadratic => (strains.as_chunks().0[t], at_quadratic_points(vertices)),
+        let corners = nodes.map(|node| body.mesh.nodes[node]);
+        let (strains, zeta, places) = match body.order() {
+            Order::Linear => ([strains[t]; 3], vertices, corners),
+            Order::Quadratic => {
+                let [x, y] = [0, 1].map(|i| at_quadratic_points(corners.map(|place| place[i])));
+                let places = [0, 1, 2].map(|q| [x[q], y[q]]);
+                (strains.as_chunks().0[t], at_quadratic_points(vertices), places)
+            }
         };
-        [0, 1, 2].map(|q| law.source(&strains[q], zeta[q]))
+        let point = |q: usize| {
+            let (place, strain, zeta) = (places[q], strains[q], zeta[q]);
+            DamagePoint { place, strain, zeta, law }
+        };
+        let points = [0, 1, 2].map(point);
+        let phi = source.of_triangle(points);
+        // NaN is refused as well.
+        let wrong = (0..3).find(|&q| !matches!(phi[q].partial_cmp(&0.0), Some(Less | Equal)));
+        wrong.map_or(Ok(phi), |q| Err((phi[q], points[q])))
     };
     body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
 }

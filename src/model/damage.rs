@@ -3,7 +3,50 @@
 use nalgebra::Vector3;
 use serde::Deserialize;
 
-/// Frémond's damage law: the source φ and the constants of equation (3).
+/// A point of the body at which the source φ is evaluated.
+#[derive(Debug, Clone, Copy)]
+pub struct DamagePoint<'a> {
+    /// (x, y), m.
+    pub place: [f64; 2],
+    /// (ε_xx, ε_yy, 2ε_xy).
+    pub strain: Vector3<f64>,
+    /// ζ.
+    pub zeta: f64,
+    /// The constants of the material.
+    pub law: &'a DamageLaw,
+}
+
+/// A damage source φ in (3). A scene gives the constants κ, λ_D, λ_U, λ_W, q* and ζ_*; a source may use them in its own
+/// way and have others. The paper's is [`Fremond`].
+pub trait DamageSource {
+    /// φ(ε, ζ) ≤ 0 at a point, 1/s.
+    fn source(&self, point: &DamagePoint) -> f64;
+
+    /// φ at three points of a triangle.
+    fn of_triangle(&self, points: [DamagePoint; 3]) -> [f64; 3] {
+        points.map(|point| self.source(&point))
+    }
+
+    /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ, for ζ′ = `rate`. The errors of the
+    /// time steps follow from it. The default, [`DamageLaw::error_growth`], holds for every
+    /// φ = −(λ_D (1 − ζ)/ζ + Ψ(ε) − λ_W)₊ with a quadratic Ψ.
+    fn error_growth(&self, law: &DamageLaw, zeta: f64, rate: f64) -> f64 {
+        law.error_growth(zeta, rate)
+    }
+}
+
+/// The paper's source, [`DamageLaw::source`].
+#[derive(Debug, Clone, Copy)]
+pub struct Fremond;
+
+impl DamageSource for Fremond {
+    #[inline]
+    fn source(&self, point: &DamagePoint) -> f64 {
+        point.law.source(&point.strain, point.zeta)
+    }
+}
+
+/// The constants of equation (3), and the source φ of Frémond that the paper takes.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 pub struct DamageLaw {
     /// Damage diffusion κ > 0, m²/s.

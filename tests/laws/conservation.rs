@@ -6,6 +6,7 @@ use signorini::{
     contact::SOLVERS,
     fem::{Body, DamageCertificate, DamageSystem, Mass, source, source_load},
     mesh::Order,
+    model::Fremond,
     petsc::Session,
 };
 
@@ -57,7 +58,8 @@ fn the_loss_of_damage_in_a_run_is_the_integral_of_the_source() {
         let (body, laws) = (&scene.body, scene.damage().unwrap());
         for pair in steps.windows(2) {
             let state = &pair[0].state;
-            let phi = source(body, laws, &body.strains(&state.u), &state.zeta);
+            let phi = source(body, (&Fremond, laws), &body.strains(&state.u), &state.zeta)
+                .expect("φ ≤ 0");
             let load = source_load(body, scene.mass(), &phi);
             let added = 0.1 * load.iter().sum::<f64>() / body.area;
             let change = pair[1].record.zeta_mean - pair[0].record.zeta_mean;

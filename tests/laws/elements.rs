@@ -11,7 +11,7 @@ use signorini::{
         source_load,
     },
     mesh::Order,
-    model::{Material, Plane},
+    model::{Fremond, Material, Plane},
     petsc::{Session, Vector},
 };
 
@@ -249,7 +249,11 @@ fn a_damage_step_solves_the_assembled_system() {
     }
     let expected = left.lu().solve(&right).unwrap();
     let mut next = zeta.clone();
-    let load = source_load(&body, Mass::Consistent, &source(&body, &[law], &strains, &zeta));
+    let load = source_load(
+        &body,
+        Mass::Consistent,
+        &source(&body, (&Fremond, &[law]), &strains, &zeta).unwrap(),
+    );
     let mut system =
         DamageSystem::new(&session, &body, Mass::Consistent, &[law.diffusion], step).unwrap();
     assert!(system.advance(&load, &mut next).unwrap());

@@ -21,6 +21,7 @@ mod contact_pressure;
 mod damage;
 mod elements;
 mod extrapolation;
+mod foreign;
 mod hertz;
 mod loads;
 mod lost_contact;

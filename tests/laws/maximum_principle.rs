@@ -8,7 +8,7 @@ use signorini::{
     evolution::{BoundViolation, DiscreteProblem, Outcome},
     fem::{Body, DamageSystem, Mass, source, source_load},
     mesh::{Mesh, Order},
-    model::DamageLaw,
+    model::{DamageLaw, Fremond},
     petsc::Session,
 };
 
@@ -29,7 +29,7 @@ fn violation(body: &Body, mass: Mass, ratio: f64) -> f64 {
     for _ in 0..20 {
         let zeta: Vec<f64> = random.field(n).iter().map(|v| 0.55 + 0.45 * v.signum()).collect();
         let (strains, _) = random_strains(&mut random, body.triangles.len());
-        let phi = source(body, &[LAW], &strains, &zeta);
+        let phi = source(body, (&Fremond, &[LAW]), &strains, &zeta).unwrap();
         let mut next = zeta.clone();
         assert!(system.advance(&source_load(body, mass, &phi), &mut next).unwrap());
         // The sharpest bounds: of ζ + kφ, triangle by triangle.
@@ -88,7 +88,7 @@ fn both_masses_integrate_constants_alike() {
     let (strains, _) = random_strains(&mut random, body.triangles.len());
     let zeta: Vec<f64> =
         random.field(body.mesh.nodes.len()).iter().map(|v| 0.6 + 0.3 * v).collect();
-    let phi = source(&body, &[LAW], &strains, &zeta);
+    let phi = source(&body, (&Fremond, &[LAW]), &strains, &zeta).unwrap();
     let [consistent, lumped] =
         [Mass::Consistent, Mass::Lumped].map(|m| source_load(&body, m, &phi));
     close(lumped.iter().sum(), consistent.iter().sum(), 1e-14);

@@ -4,14 +4,14 @@ use crate::support::{problem, run, scene, square};
 use signorini::{
     contact::SOLVERS,
     estimate::{self, Measured},
-    evolution::Outcome,
+    evolution::{Choices, Outcome},
     petsc::Session,
 };
 
 /// The measured errors of a scene on a square of n × n cells.
 fn measured(text: &str, n: usize) -> Measured {
     let (scene, session) = (scene(text), Session::start(&[]).unwrap());
-    estimate::measured_errors(&session, &scene, &square(n), SOLVERS[0], None).unwrap()
+    estimate::measured_errors(&session, &scene, &square(n), &Choices::of(&scene), None).unwrap()
 }
 
 /// A sheared square on a foundation.

@@ -3,8 +3,8 @@
 use crate::support::{bent, problem, run, square, try_run};
 use signorini::{
     contact::{SOLVERS, SolverError},
-    estimate,
-    evolution::{DiscreteProblem, Phases, RunError, SetupError},
+    estimate::Simulation,
+    evolution::{DiscreteProblem, RunError, SetupError},
     petsc::Session,
 };
 
@@ -160,7 +160,7 @@ fn steps_by_another_solver_are_noted() {
 fn an_unknown_solver_is_an_error() {
     let (session, problem) = (Session::start(&[]).unwrap(), pressed(0.0, "-1").unwrap());
     for name in ["simplex", "active-set:tron", "tao:", ""] {
-        let run = estimate::run(&session, &problem, name, &Phases::default(), &mut |_| Ok(()));
+        let run = Simulation::new(&problem).solver_named(name).run(&session);
         assert!(matches!(&run, Err(RunError::Solver(SolverError { name: n })) if n == name));
     }
 }

@@ -4,8 +4,8 @@ use crate::support::{close, history, problem};
 use nalgebra::{DMatrix, DVector};
 use signorini::{
     contact::{
-        Bound, ContactError, ContactOptions, ContactProblem, ContactReport, SOLVERS, Scales, find,
-        solvers,
+        Bound, ChosenSolver, ContactError, ContactOptions, ContactProblem, ContactReport, SOLVERS,
+        Scales, find, solvers,
     },
     linear::{LinearSolver, Precision},
     mesh::Mesh,
@@ -69,7 +69,7 @@ impl Small {
             phases: &Phases::default(),
         };
         let options = ContactOptions::default();
-        let (solver, _) = solvers(name, true, &options).unwrap();
+        let (solver, _) = solvers(&ChosenSolver::Named(name.to_owned()), true, &options).unwrap();
         let mut elastic =
             LinearSolver::new(&session, "elastic_", size, Precision::Preconditioner).unwrap();
         elastic.factor().set_condensed(&matrix, 0..size).unwrap();

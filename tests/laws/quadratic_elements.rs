@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Vector3};
 use signorini::{
     fem::{Body, Element, Elements, Mass, Terms, source, source_load},
     mesh::Order,
-    model::{Material, Plane},
+    model::{Fremond, Material, Plane},
 };
 
 /// Barycentric coordinates of the three quadrature points.
@@ -186,7 +186,8 @@ fn the_damage_source_is_taken_at_the_quadrature_points() {
         }
     }
     for mass in [Mass::Consistent, Mass::Lumped] {
-        let load = source_load(&body, mass, &source(&body, &[law], &strains, &zeta));
+        let load =
+            source_load(&body, mass, &source(&body, (&Fremond, &[law]), &strains, &zeta).unwrap());
         let error = difference(&load, &expected);
         assert!(error < 1e-14, "{error}");
     }

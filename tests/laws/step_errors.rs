@@ -6,7 +6,7 @@ use crate::support::{distorted, history, problem, run, shipped};
 use signorini::{
     contact::SOLVERS,
     estimate,
-    evolution::{DiscreteProblem, Outcome},
+    evolution::{Choices, DiscreteProblem, Outcome},
     petsc::Session,
 };
 use std::f64::consts::PI;
@@ -112,10 +112,10 @@ fn the_error_is_known_where_a_singular_point_drives_the_damage() {
 
 /// A run with its error bars, and the values of max |u| of all steps.
 fn with_bars(problem: &DiscreteProblem) -> (Outcome, Vec<f64>) {
-    let mesh = distorted(2);
+    let (mesh, scene) = (distorted(2), problem.scene());
     let session = Session::start(&[]).unwrap();
     let measured =
-        estimate::measured_errors(&session, problem.scene(), &mesh, SOLVERS[0], None).unwrap();
+        estimate::measured_errors(&session, scene, &mesh, &Choices::of(scene), None).unwrap();
     drop(session);
     let (steps, mut outcome) = history(problem, SOLVERS[0]);
     outcome.set_bars(problem, &measured).expect("PETSc works");

@@ -8,8 +8,8 @@ pub use common::{Random, curved_area, square};
 use nalgebra::{Matrix2, Vector3};
 use signorini::{
     contact::SOLVERS,
-    estimate::{self, Adapted},
-    evolution::{DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
+    estimate::{self, Adapted, Simulation},
+    evolution::{Choices, DiscreteProblem, Outcome, RunError, SetupError, Step},
     mesh::{self, Curve, Mesh, Order},
     model::DamageLaw,
     petsc::Session,
@@ -139,7 +139,7 @@ pub fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
     let session = Session::start(&[]).unwrap();
     let mut triangles = 0;
     let mut seen = |mesh: &Adapted| triangles = mesh.mesh.triangles.len();
-    let found = estimate::adapted(&session, scene, mesh, SOLVERS[0], accuracy, &mut seen);
+    let found = estimate::adapted(&session, scene, mesh, &Choices::of(scene), accuracy, &mut seen);
     let found = found.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(triangles, found.mesh.triangles.len(), "the last mesh shown is the answer");
     found
@@ -199,10 +199,12 @@ pub fn shipped_names() -> Vec<String> {
 pub fn history(problem: &DiscreteProblem, solver: &str) -> (Vec<Step>, Outcome) {
     let session = Session::start(&[]).unwrap();
     let mut steps = Vec::new();
-    let outcome = estimate::run(&session, problem, solver, &Phases::default(), &mut |step| {
+    let mut keep = |step: &Step| {
         steps.push(step.clone());
         Ok(())
-    });
+    };
+    let run = Simulation::new(problem).solver_named(solver).observer(&mut keep);
+    let outcome = run.run(&session);
     let scene = &problem.scene().name;
     (steps, outcome.unwrap_or_else(|e| panic!("{scene} by {solver}: {e}")))
 }
@@ -215,7 +217,7 @@ pub fn run(problem: &DiscreteProblem, solver: &str) -> Outcome {
 /// The outcome or why there is none.
 pub fn try_run(problem: &DiscreteProblem, solver: &str) -> Result<Outcome, RunError> {
     let session = Session::start(&[]).unwrap();
-    estimate::run(&session, problem, solver, &Phases::default(), &mut |_| Ok(()))
+    Simulation::new(problem).solver_named(solver).run(&session)
 }
 
 /// ‖a − b‖ / ‖b‖.

@@ -3,8 +3,8 @@
 use crate::support::{Random, close, difference, distorted, history, problem, same_iterations};
 use signorini::{
     contact::SOLVERS,
-    estimate,
-    evolution::{ContactStep, DiscreteProblem, Phases, RunError, Step},
+    estimate::Simulation,
+    evolution::{Choices, ContactStep, DiscreteProblem, Phases, RunError, Step},
     petsc::Session,
 };
 
@@ -34,7 +34,8 @@ fn zeta(problem: &DiscreteProblem, mean: f64) -> Vec<f64> {
 /// and not accepted; the second step.
 fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
     let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
-    let mut contact_step = ContactStep::new(&session, problem, solver, &phases).unwrap();
+    let mut contact_step =
+        ContactStep::new(&session, problem, &Choices::named(solver), &phases).unwrap();
     contact_step.solve(1, 0.9, &zeta(problem, 0.9)).unwrap();
     contact_step.accept(0.9).unwrap();
     for (time, zeta, succeeds) in tries {
@@ -158,13 +159,15 @@ fn a_chosen_step_whose_contact_fails_is_tried_again_shorter() {
 fn a_given_step_whose_contact_fails_ends_the_run_with_the_steps_before() {
     let uniform = "step = 0.2";
     let limit = patience(&history(&released(uniform, 1000), "penalty-duality").0);
-    let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
+    let session = Session::start(&[]).unwrap();
     let mut times = Vec::new();
     let problem = released(uniform, limit);
-    let run = estimate::run(&session, &problem, "penalty-duality", &phases, &mut |step| {
+    let mut keep = |step: &Step| {
         times.push(step.state.time);
         Ok(())
-    });
+    };
+    let run = Simulation::new(&problem).solver_named("penalty-duality").observer(&mut keep);
+    let run = run.run(&session);
     assert!(matches!(run, Err(RunError::Contact { step: 5, .. })), "{run:?}");
     assert_eq!(times.len(), 5);
 }

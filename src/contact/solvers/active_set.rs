@@ -9,13 +9,14 @@ use crate::{
     petsc::{PetscError, Vector},
 };
 use pivoting::{AtBounds, MAX_PIVOTS, constrain_rigid_motions, pivot, pivot_condensed};
+use std::rc::Rc;
 
 pub(super) const ACTIVE_SET: SolverEntry = SolverEntry {
     name: "active-set",
     summary: "primal-dual active set method, one linear solve per guess of the active nodes",
     variants: &[],
     rescuer: Some("tao"),
-    construct: |_, _| Box::new(ActiveSet { name: ACTIVE_SET.name }),
+    construct: |_, _| Rc::new(ActiveSet { name: ACTIVE_SET.name }),
 };
 
 /// With p = f − Kc, the contact force, the conditions of an unknown with an upper bound are

@@ -12,6 +12,7 @@ use crate::{
 };
 use omega::estimate_omega;
 use serde::Deserialize;
+use std::rc::Rc;
 
 pub(super) const PENALTY_DUALITY: SolverEntry = SolverEntry {
     name: "penalty-duality",
@@ -22,7 +23,7 @@ pub(super) const PENALTY_DUALITY: SolverEntry = SolverEntry {
         let mut options = options.penalty_duality;
         // As published.
         options.accelerate &= variant != "plain";
-        Box::new(PenaltyDuality { options })
+        Rc::new(PenaltyDuality { options })
     },
 };
 

@@ -6,7 +6,7 @@ use crate::{
     linear::{Factor, LinearSolver, Reduction},
     petsc::{BoundedQuadratic, Matrix, PetscError, ShellPreconditioner, TaoReport, Vector},
 };
-use std::iter;
+use std::{iter, rc::Rc};
 
 pub(super) const TAO: SolverEntry = SolverEntry {
     name: "tao",
@@ -14,7 +14,7 @@ pub(super) const TAO: SolverEntry = SolverEntry {
     variants: &TAO_TYPES,
     rescuer: Some("active-set"),
     construct: |kind, _| {
-        Box::new(Tao { kind: if kind.is_empty() { "tron" } else { kind }.to_owned() })
+        Rc::new(Tao { kind: if kind.is_empty() { "tron" } else { kind }.to_owned() })
     },
 };
 

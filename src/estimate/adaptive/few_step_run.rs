@@ -2,7 +2,7 @@
 
 use crate::{
     estimate::{Extremes, RecoveredStrains, UNLOADED},
-    evolution::{Callback, Outcome, Phases, RunError, Step, all_steps},
+    evolution::{Choices, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State, Value},
 };
@@ -51,7 +51,7 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn run(
         session: &Session,
         problem: &'a DiscreteProblem,
-        solver: &str,
+        choices: &Choices,
         triangles: usize,
         instants: usize,
         followed: &[f64],
@@ -59,9 +59,8 @@ impl<'a> FewStepRun<'a> {
         let mut history = History::new(instants, triangles);
         let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
-        let observer = &mut Callback(&mut observe);
-        let outcome =
-            all_steps(session, problem, solver, &phases, observer, None, followed)?.outcome;
+        let run = all_steps(session, problem, choices, &phases, &mut observe, None, followed)?;
+        let outcome = run.outcome;
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;
         }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     estimate::Extreme,
-    evolution::AIM,
+    evolution::{AIM, Choices},
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem, Figure},
@@ -107,7 +107,7 @@ impl Measurement {
         session: &Session,
         mesh: &Mesh,
         coarse: &FewStepRun,
-        solver: &str,
+        choices: &Choices,
         before: &[Level],
         accuracy: Option<f64>,
         limits: &mut Limits,
@@ -120,7 +120,7 @@ impl Measurement {
         let finer = Refinement::start(mesh.clone()).refine_everywhere()?;
         let triangles = finer.mesh.triangles.len();
         let of_fine = problem(&finer.mesh)?;
-        let run = || FewStepRun::run(session, &of_fine, solver, triangles, FEW, coarse.times());
+        let run = || FewStepRun::run(session, &of_fine, choices, triangles, FEW, coarse.times());
         let failed = |source| AdaptError::Run { triangles, source };
         let fine = limits.measure(triangles, run).map_err(failed)?;
         let answer = Level::new(coarse, mesh.clone());
@@ -143,7 +143,7 @@ impl Measurement {
         }
         let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
         let problem = problem(&finest)?;
-        let run = || FewStepRun::run(session, &problem, solver, triangles, FEW, coarse.times());
+        let run = || FewStepRun::run(session, &problem, choices, triangles, FEW, coarse.times());
         if let Ok(run) = limits.measure(triangles, run) {
             levels.push(Level::new(&run, finest));
             measured.set_bars(&Sequence::new(before, &answer, &levels), coarse, &fine);

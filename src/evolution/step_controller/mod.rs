@@ -18,9 +18,12 @@ mod step_error;
 
 use super::{
     BoundViolation, DiscreteProblem, RunError, Step, StepFailure, Stop,
-    damage_step::{DamageSource, DamageStep, DamageUpdate, PlannedStep},
+    damage_step::{DamageStep, DamageUpdate, PlannedStep, SourceLoad},
 };
-use crate::scene::{Scheme, Stepping};
+use crate::{
+    model::DamageSource,
+    scene::{Scheme, Stepping},
+};
 pub use error_control::AIM;
 use error_control::ErrorControl;
 use nalgebra::DVector;
@@ -40,6 +43,7 @@ pub(super) enum Decision {
 /// The damage system may keep its factor, see `ContactStep::solve_by_one`.
 pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
+    law: &'a dyn DamageSource,
     /// Error control of the damage; `None` for uniform steps.
     error_control: Option<ErrorControl<'a>>,
     /// Are the steps two-step backward differences? Otherwise they are Euler's.
@@ -59,7 +63,7 @@ pub(super) struct StepState {
     /// The change of this rate since t_{n−2}, for two-step differences, 1/s.
     rate_change: DVector<f64>,
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
-    source: DamageSource,
+    source: SourceLoad,
     load_change: DVector<f64>,
     /// The error of ζ̃ from the steps so far, and the sum of the moduli of their doubts. Both grow with the damage and, for
     /// two-step differences, they diffuse.
@@ -94,8 +98,9 @@ impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source. Adaptive steps end at the times `followed`.
     pub(super) fn new(
         problem: &'a DiscreteProblem,
+        law: &'a dyn DamageSource,
         zeta: &[f64],
-        source: DamageSource,
+        source: SourceLoad,
         followed: &'a [f64],
     ) -> Self {
         let zeros = DVector::zeros(zeta.len());
@@ -116,7 +121,7 @@ impl<'a> StepController<'a> {
             error_control: None,
         };
         let bdf2 = problem.scene().time.is_some_and(|grid| grid.scheme == Scheme::Bdf2);
-        Self { problem, two_step: bdf2 || error_control.is_some(), error_control, memory }
+        Self { problem, law, two_step: bdf2 || error_control.is_some(), error_control, memory }
     }
 
     /// The state for a checkpoint.
@@ -170,7 +175,7 @@ impl<'a> StepController<'a> {
         step: Box<Step>,
         damage_step: &mut DamageStep,
     ) -> Result<Decision, RunError> {
-        let source = damage_step.source(&step.state);
+        let source = damage_step.source(planned.n, &step.state)?;
         let correction = match self.two_step {
             true => damage_step.correction(planned, &source.load - &planned.load)?,
             false => DVector::zeros(damage.zeta.len()),

@@ -45,7 +45,7 @@ impl StepController<'_> {
     /// Adds the `error` of a step of `length` s to `zeta` with the mean `rate`, and its `doubt`. Earlier errors grow by
     /// the smaller one of two factors:
     ///
-    /// - exp(∫g), with g from [`error_growth`](crate::model::DamageLaw::error_growth) of the damage law, by the trapezoidal
+    /// - exp(∫g), with g from [`error_growth`](crate::model::DamageSource::error_growth) of the damage source, by the trapezoidal
     ///   rule, for strains proportional to 1/ζ. Prescribed displacements prevent such strains.
     /// - ζ'_n / ζ'_{n−1}, at least 1. An error δζ of ζ' = φ(ζ) grows like ζ', and the rise of a load adds to this.
     pub(super) fn add_error(
@@ -59,7 +59,8 @@ impl StepController<'_> {
         if let (Some(laws), Some(before)) = (self.problem.damage(), &self.memory.rate) {
             // A node may belong to several materials.
             let growth = |zeta: f64, rate: f64| {
-                let of_laws = laws.iter().map(|law| law.error_growth(zeta, rate.min(0.0)));
+                let of_laws =
+                    laws.iter().map(|law| self.law.error_growth(law, zeta, rate.min(0.0)));
                 of_laws.fold(0.0, f64::max)
             };
             for i in (0..zeta.len()).filter(|&i| before[i] < 0.0 || rate[i] < 0.0) {

@@ -7,11 +7,11 @@ use super::{
 };
 use crate::StudyError;
 use signorini::{
-    contact::SOLVERS,
-    estimate,
-    evolution::{DiscreteProblem, Phases, Step},
+    estimate::Simulation,
+    evolution::{DiscreteProblem, Step},
     fem,
     mesh::Mesh,
+    model::Fremond,
     petsc::Session,
 };
 
@@ -91,11 +91,11 @@ fn add(
 ) -> Result<(), StudyError> {
     let problem = problem(case, diffusion, step, mass)?;
     let mut history = Vec::new();
-    let outcome =
-        estimate::run(session, &problem, SOLVERS[0], &Phases::default(), &mut |accepted| {
-            history.push(accepted.clone());
-            Ok(())
-        })?;
+    let mut keep = |accepted: &Step| {
+        history.push(accepted.clone());
+        Ok(())
+    };
+    let outcome = Simulation::new(&problem).observer(&mut keep).run(session)?;
     let seen = Seen::of(&problem, &history, step);
     // The sources did not allow ζ_* to be reached there.
     let early_stop = outcome.stopped.is_some() && seen.least_admissible > problem.threshold();
@@ -182,6 +182,7 @@ impl Seen {
 fn least_source(problem: &DiscreteProblem, step: &Step) -> f64 {
     let Some(laws) = problem.damage() else { return 0.0 };
     let strains = problem.body.strains(&step.state.u);
-    let phi = fem::source(&problem.body, laws, &strains, &step.state.zeta);
+    let phi = fem::source(&problem.body, (&Fremond, laws), &strains, &step.state.zeta)
+        .expect("Frémond's source is never positive");
     phi.iter().flatten().copied().fold(0.0, f64::min)
 }

@@ -2,8 +2,10 @@
 
 use crate::StudyError;
 use signorini::{
-    estimate,
-    evolution::{ContactStep, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step},
+    estimate::Simulation,
+    evolution::{
+        Choices, ContactStep, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step,
+    },
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -62,7 +64,7 @@ pub fn run(
     problem: &DiscreteProblem,
     solver: &str,
 ) -> Result<Outcome, RunError> {
-    estimate::run(session, problem, solver, &Phases::default(), &mut |_| Ok(()))
+    Simulation::new(problem).solver_named(solver).run(session)
 }
 
 /// One static solve, from a first guess of the active nodes if there is one; the inner error
@@ -77,7 +79,7 @@ pub fn solve(
     guess: Option<&[f64]>,
 ) -> Result<Result<Step, RunError>, StudyError> {
     let phases = Phases::default();
-    let mut contact_step = ContactStep::new(session, problem, solver, &phases)?;
+    let mut contact_step = ContactStep::new(session, problem, &Choices::named(solver), &phases)?;
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }

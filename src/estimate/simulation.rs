@@ -1,0 +1,99 @@
+//! The builder of a run.
+
+use super::estimated;
+use crate::{
+    contact::ContactSolver,
+    evolution::{Choices, Observer, Outcome, Phases, RunError, RunState, Step, all_steps},
+    model::DamageSource,
+    petsc::Session,
+    problem::DiscreteProblem,
+};
+
+/// A run of Problem VP^hk, with contact solver and damage source of one's choice. The program itself starts its runs so.
+///
+/// ```no_run
+/// # use signorini::{contact::ContactSolver, estimate::Simulation, model::DamageSource};
+/// # use signorini::{evolution::{RunError, Step}, petsc::Session, problem::DiscreteProblem};
+/// # fn run(problem: DiscreteProblem, own_solver: Box<dyn ContactSolver>, own_law: Box<dyn DamageSource>)
+/// # -> Result<(), RunError> {
+/// let session = Session::start(&[])?;
+/// let outcome = Simulation::new(&problem)
+///     .solver(own_solver) // or .solver_named("tao")
+///     .law(own_law)
+///     .observer(&mut |step: &Step| {
+///         println!("t = {}: min ζ = {}", step.record.time, step.record.zeta_min);
+///         Ok(())
+///     })
+///     .run(&session)?;
+/// # Ok(())
+/// # }
+/// ```
+pub struct Simulation<'a> {
+    problem: &'a DiscreteProblem,
+    choices: Choices,
+    phases: Option<&'a Phases>,
+    observer: Option<&'a mut dyn Observer>,
+    saved: Option<RunState>,
+}
+
+impl<'a> Simulation<'a> {
+    /// A run with the contact solver of the scene, or the default one, and the paper's damage source.
+    pub fn new(problem: &'a DiscreteProblem) -> Self {
+        let choices = Choices::of(problem.scene());
+        Self { problem, choices, phases: None, observer: None, saved: None }
+    }
+
+    /// Takes a contact solver of another author. Its answers are certified as ours are, and the default solver gives the
+    /// answer of a step that it misses, unless the scene says `contact.rescue = false`.
+    #[must_use]
+    pub fn solver(self, solver: Box<dyn ContactSolver>) -> Self {
+        Self { choices: self.choices.solver(solver), ..self }
+    }
+
+    /// Takes the contact solver of this name, see [`REGISTRY`](crate::contact::REGISTRY).
+    #[must_use]
+    pub fn solver_named(self, name: &str) -> Self {
+        Self { choices: self.choices.solver_named(name), ..self }
+    }
+
+    /// Takes a damage source of another author. The scene must have `[damage]`, whose constants the source may use.
+    #[must_use]
+    pub fn law(self, source: Box<dyn DamageSource>) -> Self {
+        Self { choices: self.choices.law(source), ..self }
+    }
+
+    /// Takes solver and source of other runs.
+    #[must_use]
+    pub fn choices(self, choices: &Choices) -> Self {
+        Self { choices: choices.clone(), ..self }
+    }
+
+    /// Adds the observer, which sees every accepted step, and may keep checkpoints and end the run.
+    #[must_use]
+    pub fn observer(self, observer: &'a mut dyn Observer) -> Self {
+        Self { observer: Some(observer), ..self }
+    }
+
+    /// Starts from a checkpoint, of a run with the same problem and choices.
+    #[must_use]
+    pub fn resume(self, saved: RunState) -> Self {
+        Self { saved: Some(saved), ..self }
+    }
+
+    /// Adds the time of each phase to `phases`.
+    #[must_use]
+    pub fn phases(self, phases: &'a Phases) -> Self {
+        Self { phases: Some(phases), ..self }
+    }
+
+    /// Solves the problem, and estimates the errors of the answer at the end. Collective.
+    ///
+    /// # Errors
+    /// See [`RunError`]; every accepted step has been seen by then.
+    pub fn run(self, session: &Session) -> Result<Outcome, RunError> {
+        let Self { problem, choices, phases, observer, saved } = self;
+        let (of_run, mut ignore) = (Phases::default(), |_: &Step| Ok(()));
+        let (phases, observer) = (phases.unwrap_or(&of_run), observer.unwrap_or(&mut ignore));
+        estimated(all_steps(session, problem, &choices, phases, observer, saved, &[])?)
+    }
+}
