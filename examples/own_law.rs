@@ -18,7 +18,7 @@ pub struct TensionOnly;
 
 impl DamageSource for TensionOnly {
     fn source(&self, point: &DamagePoint) -> f64 {
-        let [xx, yy, twice_xy] = point.strain.into();
+        let [xx, yy, twice_xy] = (*point.strain).into();
         let strain = Matrix2::new(xx, 0.5 * twice_xy, 0.5 * twice_xy, yy);
         // A strain of the same |ε₊|², in the axes of the principal strains.
         let tensile = strain.symmetric_eigenvalues().map(|principal| principal.max(0.0));

@@ -4,7 +4,7 @@ use super::{DiscreteProblem, Phases, RunError, State, StepFailure, agreed};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     linear::FactorState,
-    model::{DamagePoint, DamageSource},
+    model::DamageSource,
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
@@ -86,13 +86,12 @@ impl DamageStep<'_> {
         self.phases.time("damage source", || {
             let comm = body.vertices.partition.comm();
             let phi = fem::source(body, (self.law, laws), &body.strains(&state.u), &state.zeta);
-            let phi = agreed(
-                comm,
-                phi.map_err(|(phi, DamagePoint { place, zeta, .. })| {
-                    let source = StepFailure::Source { phi, place, zeta };
-                    RunError::Step { step, time: state.time, source }
-                }),
-            )?;
+            let failed = |source| RunError::Step {
+                step,
+                time: state.time,
+                source: StepFailure::Source(source),
+            };
+            let phi = agreed(comm, phi.map_err(failed))?;
             let min = comm.min(phi.iter().flatten().copied().fold(0.0, f64::min));
             let load = fem::source_load(body, problem.mass(), &phi);
             Ok(SourceLoad { load: DVector::from_vec(load), min })

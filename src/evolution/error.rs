@@ -3,6 +3,7 @@
 use super::{DiscreteProblem, SetupError};
 use crate::{
     contact::{ContactError, SolverError},
+    fem::WrongSource,
     interrupt::Signal,
     petsc::PetscError,
     scene::rounded,
@@ -70,16 +71,9 @@ pub enum StepFailure {
          begin with -damage_pc_"
     )]
     DamageResidual(f64),
-    /// A damage source of another author is positive or no number.
-    #[error("the damage source is {phi} 1/s at ({}, {}), where ζ = {zeta}; it must be at most 0", place[0], place[1])]
-    Source {
-        /// φ, 1/s.
-        phi: f64,
-        /// Its place, m.
-        place: [f64; 2],
-        /// ζ there.
-        zeta: f64,
-    },
+    /// The damage source is positive or no number.
+    #[error(transparent)]
+    Source(#[from] WrongSource),
     /// The energy of the displacements would overflow.
     #[error(
         "the largest displacement is {0:.1e}, which is too large; check the units and look for extreme \

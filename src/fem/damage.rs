@@ -36,40 +36,52 @@ impl Mass {
     }
 }
 
+/// A damage source φ of another author is positive or no number at a point.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("the damage source is {phi} 1/s at ({}, {}), where ζ = {zeta}; it must be at most 0", place[0], place[1])]
+pub struct WrongSource {
+    phi: f64,
+    place: [f64; 2],
+    zeta: f64,
+}
+
 /// The damage source φ of (25) at three points of each triangle, 1/s: for P1 displacements at the
 /// vertices, from nodal ζ and the triangle's strain; for P2 at the quadrature points, from ζ and the strain
 /// there. `strains` are those of [`Body::strains`], `laws` the constants of the materials by their numbers.
 ///
 /// # Errors
-/// φ is positive or no number at a point. It is returned with φ.
-pub fn source<'a>(
+/// φ is positive or no number at a point.
+pub fn source(
     body: &Body,
-    (source, laws): (&dyn DamageSource, &'a [DamageLaw]),
+    (source, laws): (&dyn DamageSource, &[DamageLaw]),
     strains: &[Vector3<f64>],
     zeta: &[f64],
-) -> Result<Vec<[f64; 3]>, (f64, DamagePoint<'a>)> {
-    let of_triangle = |(t, nodes): (usize, &[usize; 3])| {
-        let (law, vertices) = (&laws[body.material(t)], nodes.map(|node| zeta[node]));
-        let corners = nodes.map(|node| body.mesh.nodes[node]);
+) -> Result<Vec<[f64; 3]>, WrongSource> {
+    let points = |t: usize| {
+        let (law, nodes) = (&laws[body.material(t)], body.mesh.triangles[t]);
+        let (vertices, corners) = (nodes.map(|n| zeta[n]), nodes.map(|n| body.mesh.nodes[n]));
         let (strains, zeta, places) = match body.order() {
-            Order::Linear => ([strains[t]; 3], vertices, corners),
+            Order::Linear => ([&strains[t]; 3], vertices, corners),
             Order::Quadratic => {
                 let [x, y] = [0, 1].map(|i| at_quadratic_points(corners.map(|place| place[i])));
                 let places = [0, 1, 2].map(|q| [x[q], y[q]]);
-                (strains.as_chunks().0[t], at_quadratic_points(vertices), places)
+                (strains.as_chunks().0[t].each_ref(), at_quadratic_points(vertices), places)
             }
         };
-        let point = |q: usize| {
-            let (place, strain, zeta) = (places[q], strains[q], zeta[q]);
-            DamagePoint { place, strain, zeta, law }
-        };
-        let points = [0, 1, 2].map(point);
-        let phi = source.of_triangle(points);
-        // NaN is refused as well.
-        let wrong = (0..3).find(|&q| !matches!(phi[q].partial_cmp(&0.0), Some(Less | Equal)));
-        wrong.map_or(Ok(phi), |q| Err((phi[q], points[q])))
+        [0, 1, 2].map(|q| DamagePoint { place: places[q], strain: strains[q], zeta: zeta[q], law })
     };
-    body.mesh.triangles.iter().enumerate().map(of_triangle).collect()
+    let triangles = 0..body.mesh.triangles.len();
+    let phi: Vec<_> = triangles.map(|t| source.of_triangle(&points(t))).collect();
+    // NaN is refused as well.
+    let is_wrong = |phi: &f64| !matches!(phi.partial_cmp(&0.0), Some(Less | Equal));
+    let all = phi.as_flattened();
+    // Counting is faster than searching.
+    if all.iter().filter(|phi| is_wrong(phi)).count() == 0 {
+        return Ok(phi);
+    }
+    let at = all.iter().position(is_wrong).unwrap_or_default();
+    let DamagePoint { place, zeta, .. } = points(at / 3)[at % 3];
+    Err(WrongSource { phi: all[at], place, zeta })
 }
 
 /// The load b_i = ∫ φ λ_i, m²/s, of a source φ from [`source`]. For P1 φ is affine between the vertices; for

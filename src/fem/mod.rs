@@ -29,7 +29,7 @@ mod patches;
 pub use body::{Body, Nodes};
 pub(crate) use cells::for_elements;
 pub use cells::{Cells, Elements};
-pub use damage::{DamageSystem, Mass, source, source_load};
+pub use damage::{DamageSystem, Mass, WrongSource, source, source_load};
 pub use damage_certificate::DamageCertificate;
 pub use edge::{Edge, GAUSS, gauss_points, normal_error, parabola};
 pub use elasticity::Elasticity;

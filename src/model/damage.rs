@@ -9,7 +9,7 @@ pub struct DamagePoint<'a> {
     /// (x, y), m.
     pub place: [f64; 2],
     /// (ε_xx, ε_yy, 2ε_xy).
-    pub strain: Vector3<f64>,
+    pub strain: &'a Vector3<f64>,
     /// ζ.
     pub zeta: f64,
     /// The constants of the material.
@@ -23,8 +23,8 @@ pub trait DamageSource {
     fn source(&self, point: &DamagePoint) -> f64;
 
     /// φ at three points of a triangle.
-    fn of_triangle(&self, points: [DamagePoint; 3]) -> [f64; 3] {
-        points.map(|point| self.source(&point))
+    fn of_triangle(&self, points: &[DamagePoint; 3]) -> [f64; 3] {
+        points.each_ref().map(|point| self.source(point))
     }
 
     /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ, for ζ′ = `rate`. The errors of the
@@ -42,7 +42,7 @@ pub struct Fremond;
 impl DamageSource for Fremond {
     #[inline]
     fn source(&self, point: &DamagePoint) -> f64 {
-        point.law.source(&point.strain, point.zeta)
+        point.law.source(point.strain, point.zeta)
     }
 }
 

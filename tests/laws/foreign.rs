@@ -42,7 +42,7 @@ fn block(order: usize, further: &str) -> Scene {
 
 /// The paper's source, written once more.
 fn paper(point: &DamagePoint) -> f64 {
-    let ([xx, yy, twice_xy], law) = (point.strain.into(), point.law);
+    let ([xx, yy, twice_xy], law) = ((*point.strain).into(), point.law);
     let zeta = point.zeta.max(law.threshold).min(1.0);
     let square = (xx * xx + yy * yy + 0.5 * twice_xy * twice_xy).min(law.strain_cap);
     (law.lambda_w - law.lambda_d * (1.0 - zeta) / zeta - 0.5 * law.lambda_u * square).min(0.0)
