@@ -36,8 +36,8 @@ const PETSC: &str = "\
 
 /// Everything the `linear` module calls.
 const CHOLMOD: &str = "\
-    cholmod_l_start|cholmod_l_finish|cholmod_l_analyze|cholmod_l_analyze_p|cholmod_l_factorize|\
-    cholmod_l_camd|cholmod_l_metis|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc|\
+    cholmod_l_start|cholmod_l_finish|cholmod_l_analyze_p|cholmod_l_factorize|\
+    cholmod_l_camd|cholmod_l_change_factor|cholmod_l_free_factor|cholmod_l_realloc|\
     dpotrf_|dpotrs_";
 
 /// MPI's constants that the `petsc` module uses: type, name, and Open MPI's variable.

@@ -2,9 +2,7 @@
 //! 2008), with the names of its user guide.
 
 use super::{LowerTriangle, raw};
-use crate::memory::{REMEDY, available};
-use crate::petsc::PetscError;
-use signal_hook::{consts::SIGTERM, low_level};
+use crate::{memory::REMEDY, petsc::PetscError};
 use std::{ffi::c_void, mem::take, ops::Range, ptr, slice};
 
 /// A `cholmod_factor` P A Pᵀ = L Lᵀ with the `cholmod_common` it was made with.
@@ -15,75 +13,37 @@ pub(super) struct Cholmod {
     allocated: usize,
 }
 
-/// CHOLMOD tries another order above this number of operations per entry of L (`cholmod_analyze` in its user
-/// guide).
-const MUCH_WORK: f64 = 500.0;
-
 /// Values are freed in blocks of 32 MB; this is the number of values.
 const FREED: usize = 1 << 22;
 
 impl Cholmod {
-    /// Orders and analyses `a`, with the last `interface` rows at the end: by minimum degree, or by nested
-    /// dissection if it needs fewer operations. It tries nested dissection where CHOLMOD does.
+    /// Orders `a` by minimum degree, with the last `interface` rows at the end (cholmod_l_camd), and analyses it
+    /// (cholmod_l_analyze_p). Nested dissection saves less time on triangle meshes than it takes (SPEED.md, section 2).
     pub(super) fn ordered(a: &mut LowerTriangle, interface: usize) -> Result<Self, PetscError> {
-        if interface == 0 {
-            let mut this = Self::start();
-            // SAFETY: a live handle; the view describes arrays that live during the call.
-            this.factor = unsafe { raw::cholmod_l_analyze(&mut a.view(), &mut *this.common) };
-            return this.analysed();
-        }
-        let mut order = Self::start().order_of(a, interface, false)?;
-        let by_degree = Self::analyse(a, order)?;
-        if by_degree.common.fl < MUCH_WORK * by_degree.common.lnz {
-            return Ok(by_degree);
-        }
-        order = Self::start().order_of(a, interface, true)?;
-        let dissected = Self::analyse(a, order)?;
-        Ok(if dissected.common.fl < by_degree.common.fl { dissected } else { by_degree })
-    }
-
-    /// An order of the rows of `a` with the last `interface` ones at the end: by nested dissection
-    /// (cholmod_l_metis), or by minimum degree (cholmod_l_camd).
-    fn order_of(
-        mut self,
-        a: &mut LowerTriangle,
-        interface: usize,
-        dissected: bool,
-    ) -> Result<Vec<i64>, PetscError> {
-        let (mut view, size, common) = (a.view(), a.size(), &mut *self.common);
-        let (none, mut order) = (ptr::null_mut(), vec![0; size]);
+        let (mut this, size, mut view, none) = (Self::start(), a.size(), a.view(), ptr::null_mut());
+        let common = &mut *this.common;
+        let mut order = vec![0; size];
         let mut sets: Vec<i64> = (0..size).map(|i| i64::from(i + interface >= size)).collect();
         let (place, sets) = (order.as_mut_ptr(), sets.as_mut_ptr());
-        // SAFETY: a live handle; the view describes arrays that live during the calls, and the order
+        // SAFETY: a live handle; the view describes arrays that live during the call, and the order
         // and the sets have as many entries as there are rows.
-        let done = unsafe {
-            match dissected {
-                true => raw::cholmod_l_metis(&mut view, none, 0, 0, place, common),
-                false => raw::cholmod_l_camd(&mut view, none, 0, sets, place, common),
-            }
-        };
-        self.check(done != 0)?;
+        let done = unsafe { raw::cholmod_l_camd(&mut view, none, 0, sets, place, common) != 0 };
+        this.check(done)?;
         order.retain(|&row| (row as usize) < size - interface);
         order.extend((size - interface) as i64..size as i64);
-        Ok(order)
-    }
-
-    /// Analyses `a` in an order (cholmod_l_analyze_p).
-    pub(super) fn analyse(a: &mut LowerTriangle, mut order: Vec<i64>) -> Result<Self, PetscError> {
-        let mut this = Self::start();
-        let (common, mut view, none) = (&mut *this.common, a.view(), ptr::null_mut());
+        let common = &mut *this.common;
         common.nmethods = 1;
         common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
-        // SAFETY: a live handle; the view describes arrays that live during the call, and `order` has as
-        // many entries as there are rows.
+        // SAFETY: as above.
         this.factor =
             unsafe { raw::cholmod_l_analyze_p(&mut view, order.as_mut_ptr(), none, 0, common) };
-        if common.status == raw::CHOLMOD_INVALID && available() > 100.0 * view.nzmax as f64 {
-            // METIS made the order. It had enough memory, but takes SIGTERM for an error of its own.
-            let _ = low_level::raise(SIGTERM);
-            return Err(PetscError::ours("ended by SIGTERM while METIS worked"));
+        this.check(!this.factor.is_null())?;
+        if this.order().iter().copied().eq(0..size as i64) {
+            // Without an order CHOLMOD factorises the matrix as it is, not a copy.
+            // SAFETY: an analysed factor.
+            unsafe { (*this.factor).ordering = raw::CHOLMOD_NATURAL as i32 };
         }
-        this.analysed()
+        Ok(this)
     }
 
     /// Without a factor.
@@ -94,17 +54,6 @@ impl Cholmod {
         this.common.print = 0;
         this.common.supernodal = raw::CHOLMOD_SUPERNODAL as i32;
         this
-    }
-
-    /// This factor, if it is analysed.
-    fn analysed(self) -> Result<Self, PetscError> {
-        self.check(!self.factor.is_null())?;
-        if self.order().iter().copied().eq(0..self.order().len() as i64) {
-            // Without an order CHOLMOD factorises the matrix as it is, not a copy.
-            // SAFETY: an analysed factor.
-            unsafe { (*self.factor).ordering = raw::CHOLMOD_NATURAL as i32 };
-        }
-        Ok(self)
     }
 
     /// Factorises `a`, which has the analysed pattern (cholmod_l_factorize). It returns false if `a` is not
@@ -203,9 +152,7 @@ impl Cholmod {
             raw::CHOLMOD_OUT_OF_MEMORY => {
                 format!("there is not enough memory for a Cholesky factor; {REMEDY}")
             }
-            // The matrix is valid, so the order is not: METIS has 32-bit indices, and cholmod_l_metis does
-            // not check whether it failed.
-            raw::CHOLMOD_TOO_LARGE | raw::CHOLMOD_INVALID => {
+            raw::CHOLMOD_TOO_LARGE => {
                 format!("the mesh is too large for a Cholesky factor (32-bit indices); {REMEDY}")
             }
             status => format!("CHOLMOD failed with status {status}"),
