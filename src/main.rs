@@ -36,6 +36,8 @@ enum Command {
     /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
     /// `mesh`, it meshes a .geo unless this was done before.
     Check(command::SceneArguments),
+    /// Write the matrices, loads and constraints of a step as Matrix Market files, for other solvers.
+    Export(command::ExportArguments),
     /// Describe a folder of results: scene, program, outcome, errors, frames.
     Info(command::ScriptArguments),
     /// Run scenes with every contact solver and compare cost and answers.
@@ -90,6 +92,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => command::run(&arguments),
         Command::New { name } => command::new(&name),
         Command::Check(arguments) => command::check(&arguments),
+        Command::Export(arguments) => command::export(&arguments),
         Command::Info(arguments) => command::script("info", &arguments),
         Command::Compare(arguments) => command::script("compare", &arguments),
         Command::Study(arguments) => command::script("study", &arguments),

@@ -9,6 +9,7 @@
 mod accuracy;
 mod check;
 mod checkpoint;
+mod export;
 mod figures;
 mod new;
 mod profile;
@@ -22,6 +23,7 @@ mod summary;
 mod task;
 
 pub use check::check;
+pub use export::{ExportArguments, export};
 pub use new::new;
 pub use provenance::version;
 pub use run::{RunArguments, run};
@@ -88,6 +90,12 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     if let Some(word) = options.first().filter(|word| !word.starts_with('-')) {
         let problem = format!("PETSc options begin with a dash, but the first is `{word}`");
         return Err(Failure::input(problem));
+    }
+    if options.iter().any(|word| word == "-elastic_ksp_view_mat") {
+        return Err(Failure::input(
+            "-elastic_ksp_view_mat: products with K are sums over elements, so it has no entries here; `signorini export` \
+             writes K and all else of a step (-elastic_ksp_view_pmat: the matrix of the factor, in nodal bases)",
+        ));
     }
     match options.windows(2).find(|pair| pair[0] == "-tao_type") {
         Some([_, kind]) if !TAO_TYPES.contains(&kind.as_str()) => Err(Failure::input(format!(

@@ -105,8 +105,10 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
 /// The matrix M + kκL of (28), with the factor of this or of an earlier step length k. With several materials L is
 /// Σ_T κ_T/κ L_T, where κ belongs to the first material.
 pub struct DamageSystem {
-    mass: Matrix,
-    laplace: Matrix,
+    /// M, m².
+    pub mass: Matrix,
+    /// L.
+    pub laplace: Matrix,
     matrix: Matrix,
     solver: LinearSolver,
     rhs: Vector,

@@ -76,6 +76,13 @@ impl NodalBases {
         self.bases.get(self.place[node] as usize).map(|(_, _, inverse)| inverse)
     }
 
+    /// The row of D that belongs to unknown `dof`.
+    pub fn direction(&self, dof: usize) -> [f64; 2] {
+        let at = self.bases.get(self.place[dof / 2] as usize);
+        let d = at.map_or_else(Matrix2::identity, |&(_, d, _)| d);
+        [d[(dof % 2, 0)], d[(dof % 2, 1)]]
+    }
+
     /// c = D u, in place.
     pub fn displacement_to_local(&self, field: &mut [f64]) {
         self.transform(field, |d, _| *d);

@@ -105,17 +105,19 @@ pub struct DiscreteProblem {
 
 /// The data of the contact problem (26) at one time.
 #[derive(Debug)]
-pub(crate) struct LoadCase {
+pub struct LoadCase {
     /// t, s.
     pub(crate) time: f64,
-    /// Nodal loads f, N per metre of thickness, and their work on the motions that contact resists.
-    pub(crate) load: Vec<f64>,
+    /// Nodal loads f, N per metre of thickness.
+    pub load: Vec<f64>,
+    /// Their work on the motions that contact resists.
     pub(crate) work: DVector<f64>,
-    /// The values of all constraints, m, and the unknowns c that they prescribe, 0 elsewhere.
+    /// The values of all constraints, m.
     pub(crate) values: Vec<f64>,
-    pub(crate) c_prescribed: Vec<f64>,
+    /// The unknowns c that they prescribe, m, 0 elsewhere.
+    pub c_prescribed: Vec<f64>,
     /// The bounds on the other unknowns.
-    pub(crate) bounds: Vec<Bound>,
+    pub bounds: Vec<Bound>,
 }
 
 impl DiscreteProblem {
@@ -215,7 +217,7 @@ impl DiscreteProblem {
     /// # Errors
     /// The load is not finite or drives an unconstrained rigid motion; prescribed values are not finite, contradict
     /// each other or penetrate the obstacle; or the obstacles leave a node no space.
-    pub(crate) fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
+    pub fn load_case(&self, time: f64) -> Result<LoadCase, SetupError> {
         let load = self.motions.balanced(&self.body, self.checked_load(time)?);
         let work = self.motions.work(&self.body, |i| [load[2 * i], load[2 * i + 1]]);
         let values = self.loads.values_at(time);
