@@ -17,8 +17,8 @@ CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridg
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
     python3-meshio python3-matplotlib
-# The tests look at processes with ps.
-PACKAGES_TEST := procps
+# The tests look at processes with ps; scipy solves the exported matrices; the others run the notebook.
+PACKAGES_TEST := procps python3-scipy python3-pandas python3-nbclient python3-ipykernel python3-tqdm
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
 # dpkg-shlibdeps finds the packages of the libraries.

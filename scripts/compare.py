@@ -83,9 +83,9 @@ def read(folder, error):
     """The cost of a run over all steps, its last state, and the largest |u| and |p| of the run. There is no
     state if the first solve failed."""
     run = load(folder) if (folder / "history.csv").exists() else None
-    if run is None or not len(run.history["step"]):
+    if run is None or not len(run.columns["step"]):
         return {"steps": 0, **dict.fromkeys(["contact_changes", *TOTALS, "seconds", *KKT])}, None
-    history = run.history
+    history = run.columns
     row = {
         "steps": int(history["step"][-1]),
         "contact_changes": np.count_nonzero(np.diff(history["active_nodes"])),

@@ -37,7 +37,7 @@ def open_run(folder):
             run = signorini_results.load(folder)
         summary = run.summary
         # Properties read their files at first use.
-        for name, read in (("history.csv", "history"), ("fields.pvd", "frames")):
+        for name, read in (("history.csv", "columns"), ("fields.pvd", "frames")):
             with whole(folder / name) as path:
                 if not getattr(run, read):
                     raise ResultError(f"{path}: it is empty")
@@ -61,7 +61,7 @@ def read_results(folder, time=None, material=None):
     try:
         elements = np.vstack([block.data for block in fields.cells if block.type in ("triangle", "triangle6")])
         pieces = Pieces(counter_clockwise(fields.points, elements), fields.point_data.get("global_node"))
-        results = Results(run.folder, run.summary, scene, run.history, run.frames, chosen[0], fields.points[:, :2],
+        results = Results(run.folder, run.summary, scene, run.columns, run.frames, chosen[0], fields.points[:, :2],
                           pieces, material=material)
         return with_fields(results, chosen[0], fields)
     except KeyError as error:

@@ -1,8 +1,12 @@
-"""Runs scenes and reads their results. It needs numpy and meshio; matplotlib to find points, pandas for tables.
+"""Runs scenes and reads their results. It needs numpy and meshio; matplotlib to find points and for pictures, pandas for
+tables, scipy for matrices.
 
     from signorini_results import load, run, table
     result = load("out/lshape")                  # or run("geo/lshape.toml", "--bars", mesh={"size": 0.5})
+    result                                       # its figures; in a notebook with a picture
     result.figures["work"]["value"], result.times, result.history["contact_force"]
+    result.plot("damage", time=0.5), result.plot.pressure()
+    result.matrices().K                          # and M, L, f, A, a, B, g, u, zeta, …: see `signorini export`
     frame = result.frame(0.5)                    # the frame nearest to t = 0.5; without a time the last one
     frame.field("zeta"), frame.field("stress_yy"), frame.at((3, 5), "strain_xx"), frame.gradient((3, 5), "zeta")
     along, zeta = frame.line((0, 5), (8, 5), "zeta")
@@ -10,14 +14,22 @@
     table(["out/lshape", "out/beam"], ["work", "clamp.force_y"])
 """
 
+import base64
 import csv
+import html
+import io
 import json
 import os
+import re
 import shutil
 import subprocess
+import sys
+import tempfile
 import xml.etree.ElementTree as ElementTree
+from contextlib import contextmanager, nullcontext
 from functools import cached_property
 from pathlib import Path
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -44,21 +56,76 @@ def load(folder):
 def run(scene, *options, out=None, **overrides):
     """Runs a scene into `out` (default: out/SCENE) and returns its results; a RuntimeError if the run fails.
 
-    `options` are those of `signorini run`. Overrides are keys of the scene: `material={"young": 2e5}`, or with points
-    `**{"material.young": 2e5}`. The program is the variable SIGNORINI, `signorini` in the path, or that of a clone.
+    The scene is a path, an open file, or a dict with the tables of a scene; files that it names are beside it, those of a
+    dict in the current folder. `options` are those of `signorini run`. Overrides are keys of the scene: `material={"young": 2e5}`, or with points
+    `**{"material.young": 2e5}`. The program is the variable SIGNORINI, `signorini` in the path, or that of a clone. A
+    notebook shows the progress if tqdm is there.
     """
+    sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
+    with _written(scene) as (path, name):
+        out = Path(out or Path("out") / name)
+        _call("run", str(path), "--out", str(out), *sets, *options)
+    return load(out)
+
+
+def _call(*arguments):
+    """Calls the program."""
     clones = (Path(__file__).resolve().parents[1], Path())
     places = [os.environ.get("SIGNORINI", "signorini"), *(str(clone / "target/release/signorini") for clone in clones)]
     program = next(filter(None, map(shutil.which, places)), None)
     if program is None:
         raise RuntimeError("the program signorini was not found; put it into PATH, or set SIGNORINI to its path")
-    out = Path(out or Path("out") / Path(scene).stem)
-    sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
-    command = [program, "run", str(scene), "--out", str(out), *sets, *options]
-    ended = subprocess.run(command, capture_output=True, text=True)
-    if ended.returncode:
-        raise RuntimeError(ended.stderr.strip().removeprefix("error: "))
-    return load(out)
+    said = []
+    with _progress() as bar, subprocess.Popen([program, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                              text=True, encoding="utf-8", errors="replace") as process:
+        try:
+            for line in process.stderr:
+                part = re.match(r" *(\d+) % after ", line)
+                if part is None:
+                    said.append(line)
+                elif bar is not None:
+                    bar.update(int(part[1]) - bar.n)
+        except BaseException:
+            process.terminate()
+            raise
+        if process.wait():
+            raise RuntimeError("".join(said).strip().removeprefix("error: "))
+        if bar is not None:
+            bar.update(100 - bar.n)
+
+
+def _progress():
+    """A bar from 0 to 100 in a notebook with tqdm, otherwise None."""
+    try:
+        if "ipykernel" in sys.modules:
+            from tqdm import tqdm
+
+            return tqdm(total=100, unit="%", leave=False, bar_format="{l_bar}{bar}| {elapsed}<{remaining}")
+    except ImportError:
+        pass
+    return nullcontext()
+
+
+@contextmanager
+def _written(scene):
+    """The path of the file of a scene, which is written for a dict, and the name of the scene."""
+    if not isinstance(scene, dict):
+        path = Path(scene.name if hasattr(scene, "read") else scene)
+        yield path, path.stem
+        return
+    with tempfile.NamedTemporaryFile("w", dir=".", prefix=".scene-", suffix=".toml", encoding="utf-8") as file:
+        file.writelines(f"{key} = {_toml(value)}\n" for key, value in {"title": "scene", **scene}.items())
+        file.flush()
+        yield Path(file.name), "scene"
+
+
+def _toml(value):
+    """A value in TOML. Strings, numbers and lists of them in JSON are the same there."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(of)}" for key, of in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value, ensure_ascii=False, default=lambda array: array.tolist())
 
 
 def _keys(overrides, prefix=""):
@@ -67,8 +134,7 @@ def _keys(overrides, prefix=""):
         if isinstance(value, dict):
             yield from _keys(value, f"{prefix}{key}.")
         else:
-            # Strings, numbers and lists in JSON are the same in TOML.
-            yield f"{prefix}{key}", json.dumps(value, ensure_ascii=False, default=lambda array: array.tolist())
+            yield f"{prefix}{key}", _toml(value)
 
 
 def table(folders, columns=None):
@@ -104,8 +170,79 @@ class Run:
         """Name of a figure → its label, unit, value in the last state, error bar, place, and governing value in the run."""
         return self.summary["figures"]
 
+    @property
+    def plot(self):
+        """Pictures: `plot("damage", time=0.5)`, `plot.pressure()`."""
+        return Plot(self)
+
+    @property
+    def ended(self):
+        """How the run ended."""
+        of, time = self.summary, self.summary["units"]["time"]
+        if of.get("error"):
+            return f"failed: {of['error']}"
+        if of["stopped_by"]:
+            return f"stopped by {of['stopped_by']} at t = {of['stopped_at']:.6g} {time}"
+        steps = f"finished at t = {of['end_time']:g} {time} after {of['steps']} steps"
+        return steps if of["steps"] else "a static solve"
+
+    def __repr__(self):
+        """The figures of the body and of contact in the last state."""
+        lines = [f"{self.folder}: {self.summary['title']}, {self.ended}"]
+        for name, of in self.figures.items():
+            if "." not in name and of["value"] is not None:
+                value, bar = of["value"], of["bar"]
+                reason = ": singular" if of["singular"] else ": not resolved" if of["unresolved"] else ""
+                has_bar = bar and bar > 1e-9 * abs(value)
+                # As many digits as the bar leaves.
+                power = lambda size: int(np.floor(np.log10(size)))
+                digits = 2 if reason else max(1, 1 + power(abs(value)) - power(bar)) if has_bar and value else 7
+                text = f"{value:.{digits}g}" + (f" ± {bar:.1g}" if has_bar else "")
+                lines.append(f"  {of['label']:<36} {text} {of['unit']}{reason}".rstrip())
+        return "\n".join([*lines, *(f"  note: {note}" for note in self.summary["notes"])])
+
+    def _repr_html_(self):
+        """The figures and a picture of the damage, or of the stress if there is no damage."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        picture, figure = io.BytesIO(), Figure(figsize=(6, 4), layout="compressed")
+        is_damaged = self.figures["zeta_min"]["value"] < 1.0
+        self.plot("damage" if is_damaged else "von_mises", axes=figure.subplots())
+        FigureCanvasAgg(figure).print_png(picture)
+        source = base64.b64encode(picture.getvalue()).decode()
+        return f'<pre>{html.escape(repr(self))}</pre><img src="data:image/png;base64,{source}">'
+
+    def matrices(self, time=None):
+        """The matrices and vectors of the last step, or of the first one that reaches `time`, by name: K, M, L, f, A, a, B,
+        g, u, zeta, zeta_before, b; nodes and triangles; `about`, their meanings. `signorini export` runs the scene again."""
+        from scipy.io import mmread
+
+        with tempfile.TemporaryDirectory() as folder:
+            until = () if time is None else ("--time", str(time))
+            _call("export", str(self.folder / "scene.toml"), "--out", folder, *until)
+            about = json.loads((Path(folder) / "export.json").read_text(encoding="utf-8"))
+            found = {"about": about, "a": np.zeros(0), "g": np.zeros(0)}
+            for name in about["files"]:
+                file, stem = Path(folder) / name, Path(name).stem
+                if file.suffix == ".csv":
+                    found[stem] = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
+                else:
+                    read = mmread(file)
+                    found[stem] = read.ravel() if isinstance(read, np.ndarray) else read.tocsr()
+        return SimpleNamespace(**found)
+
     @cached_property
     def history(self):
+        """history.csv as a pandas frame; without pandas `columns`."""
+        try:
+            import pandas
+        except ImportError:
+            return self.columns
+        return pandas.DataFrame(self.columns)
+
+    @cached_property
+    def columns(self):
         """Column of history.csv → array; a missing number is NaN."""
         with open(self.folder / "history.csv", newline="", encoding="utf-8") as file:
             names, *rows = csv.reader(file)
@@ -140,6 +277,49 @@ class Run:
         """The frame nearest to a time, or the last one."""
         at = min(self.frames, key=lambda of: abs(of[0] - time)) if time is not None else self.frames[-1]
         return Frame(self, *at)
+
+
+class Plot:
+    """Pictures of a run by matplotlib: each call returns its axes."""
+
+    def __init__(self, run):
+        self.run, self.units = run, run.summary["units"]
+
+    def __call__(self, name="damage", time=None, axes=None, factor=0.0, **style):
+        """A field at a time (default: the last frame): damage, that is 1 − ζ, or a name of `Frame.field`; on the body
+        with `factor` times its displacements. `style` is for `Axes.tripcolor`."""
+        import matplotlib.pyplot as pyplot
+
+        frame, axes = self.run.frame(time), axes or pyplot.figure(layout="compressed").subplots()
+        values = 1.0 - frame.field("zeta") if name == "damage" else frame.field(name)
+        unit = "length" if name in ("u_x", "u_y", "gap") else "" if name in ("damage", "zeta") else "stress"
+        corners, points = frame.elements[:, :3], frame.points + factor * frame.field("displacement")[:, :2]
+        # A peak on a small area must not darken the rest: the colours end where 0.5 % of the area has more.
+        a, b, c = (frame.points[corners[:, k]] for k in range(3))
+        means, areas = values[corners].mean(axis=1), _cross(b - a, c - a)
+        order = means.argsort()
+        top = means[order[np.searchsorted(areas[order].cumsum(), 0.995 * areas.sum())]]
+        peaks = {"vmax": top} if values.max() > 4.0 * top > 0.0 else {}
+        style = {"shading": "gouraud", "cmap": "magma" if name == "damage" else "viridis", **peaks, **style}
+        label = "damage 1 − ζ" if name == "damage" else f"{name} ({self.units[unit]})" if unit else name
+        axes.figure.colorbar(axes.tripcolor(*points.T, corners, values, **style), ax=axes, label=label,
+                             extend="max" if peaks else "neither")
+        axes.set(aspect="equal", xlabel=f"x ({self.units['length']})", ylabel=f"y ({self.units['length']})",
+                 title=f"t = {frame.time:g} {self.units['time']}")
+        return axes
+
+    def pressure(self, time=None, axes=None):
+        """The contact pressure along each foundation."""
+        import matplotlib.pyplot as pyplot
+
+        frame, axes = self.run.frame(time), axes or pyplot.figure(layout="compressed").subplots()
+        names = [name.removesuffix(".contact_length") for name in self.run.figures if name.endswith(".contact_length")]
+        for name in names:
+            axes.plot(*frame.along(name, "normal_pressure"), label=name)
+        axes.set(xlabel=f"along the foundation ({self.units['length']})", ylabel=f"pressure ({self.units['stress']})",
+                 title=f"t = {frame.time:g} {self.units['time']}")
+        axes.legend()
+        return axes
 
 
 class Frame:

@@ -18,6 +18,7 @@ mod losses;
 mod kept;
 mod keys;
 mod meshes;
+mod notebook;
 mod odd_names;
 mod provenance;
 mod refused;
