@@ -50,7 +50,7 @@ help:
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
-	@echo 'make bench      speed against FEniCSx and the unavoidable work, growth; or ARGS=--quick'
+	@echo 'make bench      speed against FEniCSx, growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'

@@ -43,11 +43,6 @@ impl Phases {
         result
     }
 
-    /// The phase `name`, if it was entered.
-    pub fn get(&self, name: &str) -> Option<Phase> {
-        self.0.borrow().get(name).copied()
-    }
-
     /// The parts of the phase `whole` by their names; for "" the phases that are not parts.
     pub fn parts(&self, whole: &str) -> Vec<(&'static str, Phase)> {
         let phases = self.0.borrow();

@@ -125,10 +125,9 @@ class Bench:
         # The first step also makes the factor and other data that all steps use.
         mean = lambda key: sum(row[key] for row in history[2:]) / len(history[2:])
         phases = dict(re.findall(r"^ +([A-Za-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
-        peak = re.findall(r"peak memory (\d+)", said)
         row = {"nodes": summary["nodes"], "seconds_per_step": mean("seconds"), "whole_seconds": whole,
                "solves": mean("linear_iterations"), "factorisations": mean("factorisations"),
-               "kkt": max(summary["kkt"].values()), "peak_mb": float(peak[-1]) if peak else np.nan}
+               "kkt": max(summary["kkt"].values()), "peak_mb": summary["peak_megabytes"]}
         return row, history, {name: 1e-3 * float(ms) for name, ms in phases.items()}
 
     def fenicsx(self, scene, mesh, order, method, steps):

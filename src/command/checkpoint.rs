@@ -39,7 +39,6 @@ pub struct Checkpoint {
 /// The state of a recorder in a checkpoint.
 #[derive(Serialize, Deserialize)]
 pub struct Recorded {
-    pub stepping: f64,
     pub fields: FieldsWritten,
     /// The length of `history.csv`, bytes.
     pub history: Option<u64>,

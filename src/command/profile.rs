@@ -2,24 +2,13 @@
 
 use comfy_table::{LineStyle, presets};
 use signorini::{
-    memory,
     output::terminal,
     phases::{Phase, Phases},
 };
+use std::iter::once;
 
-/// The phases that every time step needs: the values of K, a product with K, a pair of triangular solves,
-/// and the damage.
-const UNAVOIDABLE: [&str; 4] =
-    ["stiffness", "contact/products", "contact/triangular solves", "damage solve"];
-
-/// The table of a run of `wall` seconds, and remarks on its `steps`, which took `stepping` seconds.
-pub fn lines(phases: &Phases, wall: f64, steps: usize, stepping: f64) -> Vec<String> {
-    let blank = || vec![String::new()];
-    [blank(), table(phases, wall), blank(), remarks(phases, steps, stepping)].concat()
-}
-
-/// The table of phases and their parts, longest first, for a run of `wall` seconds.
-fn table(phases: &Phases, wall: f64) -> Vec<String> {
+/// The table of phases and their parts, longest first, for a run of `wall` seconds. It begins with an empty line.
+pub fn table(phases: &Phases, wall: f64) -> Vec<String> {
     let mut lines = Vec::new();
     for (name, phase) in rows(phases, "", wall) {
         lines.push((name.to_owned(), phase));
@@ -31,7 +20,7 @@ fn table(phases: &Phases, wall: f64) -> Vec<String> {
     let rule = LineStyle::none().fill('─').junction('─');
     let table = terminal::table(presets::NOTHING.header_separator(rule), cells, 1);
     // The table pads its last column too.
-    table.lines().map(|line| format!(" {}", line.trim_end())).collect()
+    once(String::new()).chain(table.lines().map(|line| format!(" {}", line.trim_end()))).collect()
 }
 
 /// The parts of the phase `whole`, longest first, and the rest of its `seconds`.
@@ -59,20 +48,4 @@ fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
         ("MB per call", if_moved(format!("{:.1}", 1e-6 * bytes / calls))),
         ("GB/s", if_moved(format!("{:.1}", 1e-9 * bytes / seconds))),
     ]
-}
-
-/// The share of the necessary phases in `stepping`, the seconds of `steps` steps, and the peak memory.
-fn remarks(phases: &Phases, steps: usize, stepping: f64) -> Vec<String> {
-    let mean = |name: &&str| phases.get(name).map(|p| 1e3 * p.seconds / p.calls.max(1.0));
-    let unavoidable: f64 = UNAVOIDABLE.iter().filter_map(mean).sum();
-    let step = 1e3 * stepping / steps as f64;
-    let share = (steps > 0).then(|| {
-        format!(
-            " unavoidable work, once per step (refill, product, triangular solves, damage): \
-             {unavoidable:.2} ms,\n {:.0} % of the {step:.2} ms that a step took",
-            100.0 * unavoidable / step
-        )
-    });
-    let memory = format!(" peak memory {:.0} MB", 1e-6 * memory::peak());
-    share.into_iter().chain([memory]).collect()
 }

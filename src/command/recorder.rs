@@ -38,8 +38,6 @@ pub(super) struct Recorder<'a> {
     /// The numbers of the figures that a [`StepRecord`] does not have: the columns after it.
     added: Vec<usize>,
     last: Option<Step>,
-    /// The time of all accepted steps after n = 0, s.
-    stepping: f64,
     /// The time of the last checkpoint.
     saved: Instant,
 }
@@ -57,8 +55,7 @@ impl<'a> Recorder<'a> {
         let more = added.iter().map(|&number| task.problem.figures[number].name.as_str());
         let more = Vec::from_iter(more.chain(["seconds"]));
         let history = Table::new(task.folder.join("history.csv"), &StepRecord::default(), &more)?;
-        let (last, stepping) = Default::default();
-        Ok(Self { task, fields, bar, history, added, last, stepping, saved })
+        Ok(Self { task, fields, bar, history, added, last: None, saved })
     }
 
     /// Continues from a checkpoint and shows its time.
@@ -66,7 +63,6 @@ impl<'a> Recorder<'a> {
         &mut self,
         Checkpoint { recorded, run, .. }: &Checkpoint,
     ) -> Result<(), OutputError> {
-        self.stepping = recorded.stepping;
         self.fields.resume(&recorded.fields);
         self.history.resume(recorded.history);
         self.last = Some(run.last().clone());
@@ -127,9 +123,6 @@ impl<'a> Recorder<'a> {
             if !comm.all(started.is_ok()) {
                 return started;
             }
-        }
-        if step.record.step > 0 {
-            self.stepping += step.record.seconds;
         }
         let written = self.task.phases.time("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
@@ -195,8 +188,7 @@ impl<'a> Recorder<'a> {
         let shown = if task.profile { &notes } else { &notes[..warnings] };
         let mut lines = screen::conclusion(task, record, figures.as_ref(), result, shown);
         if task.profile {
-            let steps = record.map_or(0, |record| record.step);
-            lines.extend(profile::lines(task.phases, wall, steps, self.stepping));
+            lines.extend(profile::table(task.phases, wall));
         }
         lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB")));
         bar.finish();
@@ -221,8 +213,7 @@ impl Observer for Recorder<'_> {
     fn keep(&mut self, state: RunState) -> Observed {
         self.fields.complete()?;
         let (fields, history) = (self.fields.written(), self.history.length());
-        let recorded = Recorded { stepping: self.stepping, fields, history };
-        checkpoint::write(self.task, recorded, state)?;
+        checkpoint::write(self.task, Recorded { fields, history }, state)?;
         self.saved = Instant::now();
         Ok(())
     }

@@ -250,7 +250,7 @@ fn the_profile_has_the_parts_of_a_step_and_counts_the_pairs_of_triangular_solves
     let directory = TestDirectory::new();
     let out =
         directory.run(&["--profile", "--set", "boundary.top.traction=[0, '-1 - sin(6*t)']"]).out;
-    for fragment in ["ms per call", "GB/s", "unavoidable work", "peak memory"] {
+    for fragment in ["ms per call", "GB/s"] {
         assert!(out.contains(fragment), "no `{fragment}` in: {out}");
     }
     let row = |name: &str| -> Vec<&str> {
