@@ -222,7 +222,7 @@ class Run:
             until = () if time is None else ("--time", str(time))
             _call("export", str(self.folder / "scene.toml"), "--out", folder, *until)
             about = json.loads((Path(folder) / "export.json").read_text(encoding="utf-8"))
-            found = {"about": about, "a": np.zeros(0), "g": np.zeros(0)}
+            found = {"about": about, "u_D": np.zeros(0), "g": np.zeros(0)}
             for name in about["files"]:
                 file, stem = Path(folder) / name, Path(name).stem
                 if file.suffix == ".csv":

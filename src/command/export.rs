@@ -1,13 +1,14 @@
 //! `signorini export`: the matrices of a step in the plain nodal unknowns, for programs of other authors.
 
-use super::{Failure, SOLVERS, SceneArguments, accuracy, read_mesh, require_one_process, screen};
+use super::{Failure, SceneArguments, accuracy, read_mesh, require_one_process, screen};
 use clap::Args;
 use serde_json::json;
 use signorini::{
     contact::Bound,
-    estimate,
-    evolution::{Phases, RunError},
+    estimate::Simulation,
+    evolution::{RunError, Step},
     fem::{DamageSystem, NodalBases, Stiffness, source, source_load},
+    model::Fremond,
     output::{create, terminal::say, write_whole},
     petsc::{Matrix, PetscError, Session},
     problem::{DiscreteProblem, LoadCase, State},
@@ -47,19 +48,19 @@ pub fn export(arguments: &ExportArguments) -> Result<(), Failure> {
 fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let ExportArguments { scene, time, out } = arguments;
     let (mut scene, _) = scene.read(&[])?;
-    let solver = scene.contact.solver.clone().unwrap_or(SOLVERS[0].to_owned());
     let mesh = read_mesh(&scene, true)?;
-    let adapted = accuracy::adapt(session, &mut scene, &mesh, &solver, None)?;
+    let adapted = accuracy::adapt(session, &mut scene, &mesh, None)?;
     let mesh = adapted.map_or(mesh, |adapted| adapted.mesh);
     let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut states = Vec::new();
-    let ended = estimate::run(session, &problem, &solver, &Phases::default(), &mut |step| {
+    let mut keep = |step: &Step| {
         states.insert(0, step.state.clone());
         states.truncate(2);
         // The times of steps are rounded. An error ends the run.
         let reached = time.is_some_and(|time| step.state.time >= time * (1.0 - 1e-9));
         if reached { Err("the time is reached".into()) } else { Ok(()) }
-    });
+    };
+    let ended = Simulation::new(&problem).observer(&mut keep).run(session);
     if !matches!(ended, Err(RunError::Observer(_))) {
         let end = rounded(ended?.last.state.time);
         if let Some(time) = time {
@@ -118,7 +119,7 @@ fn files(
         ("K.mtx", square(&stiffness.matrix)?),
         ("A.mtx", sparse(load.len(), &a_rows)),
         ("B.mtx", sparse(load.len(), &b_rows)),
-        ("a.mtx", vector(&a)),
+        ("u_D.mtx", vector(&a)),
         ("g.mtx", vector(&g)),
         ("f.mtx", vector(&load)),
         ("u.mtx", vector(&states[0].u)),
@@ -129,11 +130,12 @@ fn files(
     if let (Some(laws), Some(before)) = (problem.damage(), states.get(1)) {
         let mass = problem.mass();
         let system = DamageSystem::new(session, body, mass, &problem.diffusions(), 1.0)?;
-        let phi = source(body, laws, &body.strains(&before.u), &before.zeta);
+        let phi = source(body, (&Fremond, laws), &body.strains(&before.u), &before.zeta)
+            .map_err(Failure::input)?;
         files.extend([
             ("M.mtx", square(&system.mass)?),
             ("L.mtx", square(&system.laplace)?),
-            ("b.mtx", vector(&source_load(body, mass, &phi))),
+            ("source.mtx", vector(&source_load(body, mass, &phi))),
             ("zeta_before.mtx", vector(&before.zeta)),
         ]);
     }

@@ -34,10 +34,10 @@ def check(folder):
     files = [name.removesuffix(".mtx") for name in about["files"] if name.endswith(".mtx")]
     read = {name: scipy.io.mmread(folder / f"{name}.mtx") for name in files}
     read = {name: value.ravel() if isinstance(value, np.ndarray) else value.tocsr() for name, value in read.items()}
-    for name in ("a", "g"):
+    for name in ("u_D", "g"):
         read.setdefault(name, np.zeros(0))
     assert set(about["files"]) | {"export.json"} <= {path.name for path in folder.iterdir()}
-    u, p = contact(*(read[name] for name in ("K", "A", "B", "a", "f", "g")))
+    u, p = contact(*(read[name] for name in ("K", "A", "B", "u_D", "f", "g")))
     size = abs(u).max()
     if not size > 0.0 or abs(u - read["u"]).max() > 1e-8 * size:
         yield f"u differs by {abs(u - read['u']).max() / size}"
@@ -47,12 +47,12 @@ def check(folder):
         yield "nodes.csv does not number the unknowns"
     if "M" in read:
         k, kappa = about["k"], about["kappa"]
-        right = read["M"] @ read["zeta_before"] + k * read["b"]
+        right = read["M"] @ read["zeta_before"] + k * read["source"]
         zeta = spsolve((read["M"] + k * kappa * read["L"]).tocsc(), right)
         damage = 1.0 - read["zeta"].min()
         if not damage > 1e-3 or abs(zeta - read["zeta"]).max() > 1e-10:
             yield f"ζ differs by {abs(zeta - read['zeta']).max()}; damage {damage}"
-    print(folder.name, "open" if (p == 0.0).any() else "", "closed" if (p > 0.0).any() else "", len(read["a"]))
+    print(folder.name, "open" if (p == 0.0).any() else "", "closed" if (p > 0.0).any() else "", len(read["u_D"]))
 
 
 for folder in map(Path, sys.argv[1:]):
