@@ -127,7 +127,7 @@ class Draw:
         if self.timed:
             count = int(self.rng.integers(2, 7))
             end = 10 ** self.number(-2, 2) if self.chance(0.3) else 1.0
-            scene["time"] = {"end": end, "step": end / count}
+            scene["time"] = {"end": end, "step": end / count, "scheme": "euler"}
         if self.chance(0.4) or not any("traction" in b for b in self.boundary.values()):
             size = self.stress / self.length * 10 ** self.number(-1, 0.5)
             force = self.rng.standard_normal(2) if self.pressed is None else self.pressed

@@ -34,7 +34,7 @@ def read_scene(path):
 # The keys that the independent codes follow, and the tables without effect on the discrete answer.
 FOLLOWED = {
     f"{table}.{key}" for table, keys in {
-        "material": "young poisson plane density", "discretisation": "displacement", "time": "end step",
+        "material": "young poisson plane density", "discretisation": "displacement", "time": "end step scheme",
         "damage": "diffusion lambda_d lambda_u lambda_w strain_cap threshold initial mass", "body": "force gravity",
         "boundary": "name displacement symmetry gap normal traction pressure",
     }.items() for key in keys.split()
@@ -57,6 +57,8 @@ def must_be_followed(scene):
     unknown = sorted({key for key in keys() if key.split(".")[0] not in WITHOUT_EFFECT} - FOLLOWED)
     if unknown:
         raise SceneError(f"this code does not know the keys {', '.join(unknown)}; take them out of the scene")
+    if "damage" in scene and "time" in scene and scene["time"].get("scheme") != "euler":
+        raise SceneError('this code knows time.scheme = "euler" alone')
 
 
 def of_material(scene, mesh, table, key, default=None):

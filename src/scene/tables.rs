@@ -188,7 +188,7 @@ struct TimeKeys {
     /// A number (s) or "auto" for adaptive steps.
     step: toml::Value,
     tolerance: Option<f64>,
-    scheme: Option<Scheme>,
+    scheme: Scheme,
 }
 
 /// The default tolerance of `step = "auto"`: the error of ζ over the damage.
@@ -197,12 +197,9 @@ const STEP_TOLERANCE: f64 = 0.01;
 fn time(keys: TimeKeys) -> Result<TimeGrid, Diagnostic> {
     let TimeKeys { end, step, tolerance, scheme } = keys;
     let Ok(length) = step.try_into::<f64>() else {
-        if scheme == Some(Scheme::Euler) {
-            return Err(("scheme", "must be \"bdf2\" where step = \"auto\"".to_owned()));
-        }
         let stepping =
             Stepping::Auto { tolerance: tolerance.unwrap_or(STEP_TOLERANCE), expected: [0.0; 2] };
-        return Ok(TimeGrid { end, step: None, stepping, scheme: Scheme::Bdf2 });
+        return Ok(TimeGrid { end, step: None, stepping, scheme });
     };
     if tolerance.is_some() {
         return Err(("tolerance", "has no effect unless step = \"auto\"".to_owned()));
@@ -214,8 +211,7 @@ fn time(keys: TimeKeys) -> Result<TimeGrid, Diagnostic> {
     if end / length > MOST_STEPS {
         return Err(("step", format!("is {length}: more than {MOST_STEPS:e} steps to {end}")));
     }
-    let scheme = scheme.unwrap_or_default();
-    Ok(TimeGrid { scheme, ..TimeGrid::uniform(end, length) })
+    Ok(TimeGrid::uniform(end, length, scheme))
 }
 
 #[derive(Deserialize)]

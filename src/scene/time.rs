@@ -19,11 +19,10 @@ pub struct TimeGrid {
 }
 
 /// The time discretisation.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scheme {
     /// Euler's backward differences with the source at the old time, as in (25); first order.
-    #[default]
     Euler,
     /// Two-step backward differences with an extrapolated source; second order.
     Bdf2,
@@ -50,11 +49,11 @@ pub enum Stepping {
 }
 
 impl TimeGrid {
-    /// The uniform partition (25) of [0, `end`] with the largest steps up to `step` (both positive, s), for
-    /// Euler's scheme. A step that divides the end up to rounding is kept.
-    pub fn uniform(end: f64, step: f64) -> Self {
+    /// The uniform partition (25) of [0, `end`] with the largest steps up to `step` (both positive, s). A step that
+    /// divides the end up to rounding is kept.
+    pub fn uniform(end: f64, step: f64, scheme: Scheme) -> Self {
         let steps = (end / step - 1e-9).ceil().max(1.0) as usize;
-        Self { end, step: Some(step), stepping: Stepping::Uniform { steps }, scheme: Scheme::Euler }
+        Self { end, step: Some(step), stepping: Stepping::Uniform { steps }, scheme }
     }
 
     /// Can a step end at `time`? With an accuracy the program chooses the steps.

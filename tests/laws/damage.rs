@@ -35,7 +35,7 @@ fn strained_of_order(
     let u = format!("['({factor})*(0.02*x + 0.02*y)', '({factor})*(0.01*x - 0.01*y)']");
     let text = format!(
         "discretisation.displacement = {order}\n{MATERIAL}\n{damage}
-         time = {{ end = 1, step = {step:?} }}
+         time = {{ end = 1, step = {step:?}, scheme = 'euler' }}
          boundary = [
             {{ name = 'left', displacement = {u} }},
             {{ name = 'right', displacement = {u} }},
@@ -112,7 +112,7 @@ fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> DiscreteProbl
          damage = {{ diffusion = {diffusion:?}, lambda_d = 0, lambda_u = 1, lambda_w = 0,
                      strain_cap = 1, threshold = 0.01, initial = '0.7 + 0.25*cos(pi*x)',
                      mass = '{mass}' }}
-         time = {{ end = 1, step = {step:?} }}
+         time = {{ end = 1, step = {step:?}, scheme = 'euler' }}
          boundary = [{{ name = 'left', displacement = [0, 0] }}]"
     );
     problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
@@ -194,7 +194,8 @@ fn rate(t: f64, zeta: f64) -> f64 {
 fn uniform_stress_keeps_damage_uniform_and_follows_the_scalar_recursion() {
     // ζ_n = ζ_{n−1} + k φ(t_{n−1}, ζ_{n−1}), for every solver of the contact.
     for (solver, order) in SOLVERS.into_iter().flat_map(|solver| [(solver, 1), (solver, 2)]) {
-        let (steps, _) = history(&uniaxial(order, distorted(4), "step = 0.05", 0.01), solver);
+        let (steps, _) =
+            history(&uniaxial(order, distorted(4), "step = 0.05, scheme = 'euler'", 0.01), solver);
         let mut zeta = 0.95;
         for pair in steps.windows(2) {
             zeta += 0.05 * rate(pair[0].state.time, zeta);

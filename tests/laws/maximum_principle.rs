@@ -104,7 +104,7 @@ fn soft_square(mesh: Mesh, low: f64, ratio: f64, mass: &str) -> DiscreteProblem 
         "material = {{ young = 80, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = {:?}, lambda_d = 0, lambda_u = 1, lambda_w = 0, strain_cap = 1,
                      threshold = 0.01, initial = '{initial}' {mass} }}
-         time = {{ end = 1, step = 0.1 }}
+         time = {{ end = 1, step = 0.1, scheme = 'euler' }}
          boundary = [{{ name = 'left', displacement = [0, 0] }}]",
         10.0 * ratio / 64.0
     );

@@ -143,7 +143,7 @@ fn bars_hold_for_strains_that_rise_fall_and_jump() {
         ("3*t - if(t < 1/3, 0, if(t < 2/3, 1, 2))", |t| 3.0 * t - (3.0 * t).floor()),
     ];
     let steppings = [
-        ("step = 0.04", 0.0),
+        ("step = 0.04, scheme = 'euler'", 0.0),
         ("step = 0.03125, scheme = 'bdf2'", 0.1),
         ("step = 'auto', tolerance = 0.03", 0.1),
         ("step = 'auto', tolerance = 0.003", 0.0),

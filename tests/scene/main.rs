@@ -12,7 +12,8 @@ use signorini::fem::Mass;
 use signorini::mesh::Order;
 use signorini::model::Plane;
 use signorini::scene::{
-    Boundary, Condition, Expression, MeshSource, Scene, Stepping, SurfaceLoad, TimeGrid, Units,
+    Boundary, Condition, Expression, MeshSource, Scene, Scheme, Stepping, SurfaceLoad, TimeGrid,
+    Units,
 };
 
 /// A complete scene; a test changes a line of it.
@@ -73,7 +74,11 @@ fn the_examples_carry_the_printed_data() {
         assert_eq!((law.diffusion, law.threshold), (diffusion, 0.01), "{name}");
         assert_eq!((law.lambda_d, law.lambda_u, law.lambda_w), (lambda_d, lambda_u, 0.0));
         assert_eq!(law.strain_cap, 1000.0, "{name}");
-        assert_eq!(scene.time, Some(TimeGrid::uniform(1.0, 1.0 / steps as f64)), "{name}");
+        assert_eq!(
+            scene.time,
+            Some(TimeGrid::uniform(1.0, 1.0 / steps as f64, Scheme::Euler)),
+            "{name}"
+        );
         let names: Vec<&str> = scene.boundaries.iter().map(|b| b.name.as_str()).collect();
         assert_eq!(names, curves, "{name}");
         let load = scene.boundaries.iter().find_map(|b| b.loads().next());
@@ -189,7 +194,7 @@ fn the_time_grid_is_uniform_and_not_coarser_than_asked() {
         (1.0, 1.0, 1),
         (2.0, 1.999, 2),
     ] {
-        let grid = TimeGrid::uniform(end, step);
+        let grid = TimeGrid::uniform(end, step, Scheme::Bdf2);
         assert_eq!(grid.stepping, Stepping::Uniform { steps }, "{end} by {step}");
         assert!(end / steps as f64 <= step * (1.0 + 1e-8));
         assert_eq!(grid.end, end);
