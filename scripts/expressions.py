@@ -44,7 +44,7 @@ class Expression:
             # In Python the power is **, and `if` is not a function.
             text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
             tree = _Functions().visit(ast.parse(text, mode="eval"))
-            names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table"] if folder else [])}
+            names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table", "spline"] if folder else [])}
             for node in ast.walk(tree):
                 if not isinstance(node, ALLOWED):
                     raise ExpressionError(f"expression '{self.text}': {type(node).__name__} is not allowed")
@@ -55,17 +55,77 @@ class Expression:
             raise ExpressionError(f"expression '{self.text}': {error}") from None
 
     def __call__(self, x, y, t, functions=NUMPY_FUNCTIONS):
-        def table(name, argument=t):
+        def points(name):
             rows = np.genfromtxt(self.folder / name, delimiter=",")
-            return np.interp(argument, *rows[~np.isnan(rows).any(axis=1)].T)
+            return rows[~np.isnan(rows).any(axis=1)].T
 
-        return eval(self._code, {"__builtins__": {}}, {**functions, "table": table, "x": x, "y": y, "t": t})
+        tables = {"table": lambda name, argument=t: np.interp(argument, *points(name)),
+                  "spline": lambda name, argument=t: spline(argument, *points(name))}
+        return eval(self._code, {"__builtins__": {}}, {**functions, **tables, "x": x, "y": y, "t": t})
 
     def at(self, points, t=0.0):
         """Values at an (n, 2) array of points."""
         with np.errstate(all="ignore"):
             values = self(points[:, 0], points[:, 1], t)
         return np.broadcast_to(np.asarray(values, float), len(points)).copy()
+
+
+def spline(at, a, f):
+    """The monotone piecewise cubic function through points (a, f), constant beyond them; two points with the same a are a
+    jump, which divides it."""
+    values, first = np.full(np.shape(at), f[0], float), [0, *np.flatnonzero(np.diff(a) == 0.0) + 1]
+    for i, j in zip(first, [*first[1:], len(a)]):
+        values = np.where(at >= a[i], _without_jumps(np.clip(at, a[i], a[j - 1]), a[i:j], f[i:j]), values)
+    return values
+
+
+def _without_jumps(at, a, f):
+    if len(a) < 3:
+        return np.interp(at, a, f)
+    h, s = np.diff(a), np.diff(f) / np.diff(a)
+    w, v = h[:-1] + 2.0 * h[1:], 2.0 * h[:-1] + h[1:]
+    rises = s[:-1] * s[1:] > 0.0
+    inner = (w + v) / (w / np.where(rises, s[:-1], 1.0) + v / np.where(rises, s[1:], 1.0)) * rises
+
+    def end(i, j):
+        return np.clip(s[i] + h[i] / (h[i] + h[j]) * (s[i] - s[j]), *sorted((0.0, 3.0 * s[i])))
+
+    slopes = np.array([end(0, 1), *inner, end(-1, -2)])
+    i = np.clip(np.searchsorted(a, at, side="right") - 1, 0, len(h) - 1)
+    z, s, p, q = (at - a[i]) / h[i], s[i], slopes[i], slopes[i + 1]
+    return f[i] + z * h[i] * (p + z * (3.0 * s - 2.0 * p - q + z * (p + q - 2.0 * s)))
+
+
+def with_values(scene, folder):
+    """The scene with the values of its constants in place of their names, and with numbers in place of expressions in
+    which no x, y or t is left."""
+    values = {}
+
+    def number(text):
+        try:
+            varies = re.search(r"\b([xyt]|table|spline)\b", text)
+            return None if varies else float(Expression(text, folder)(0.0, 0.0, 0.0))
+        except (ExpressionError, TypeError, ValueError, ArithmeticError, OSError):
+            return None
+
+    def replaced(value):
+        if isinstance(value, dict):
+            return {key: of if key in ("name", "plane", "mass") else replaced(of) for key, of in value.items()}
+        if isinstance(value, list):
+            return [replaced(of) for of in value]
+        # Names of files stand in quotes.
+        words = r"""("[^"]*"|'[^']*'|\b[^\W\d]\w*)"""
+        text = re.sub(words, lambda word: values.get(word[0], word[0]), value) if isinstance(value, str) else value
+        found = None if text == value else number(text)
+        return text if found is None else found
+
+    constants = scene.get("constants", {})
+    # Each time at least one more gets its value.
+    for name, written in [*constants.items()] * len(constants):
+        found = number(str(replaced(written)))
+        values.update({} if found is None else {name: f"({found!r})" if found < 0.0 else repr(found)})
+    tables = ("boundary", "body", "damage", "material", "probe")
+    return {name: replaced(table) if name in tables else table for name, table in scene.items()}
 
 
 def evaluate(expression, points, t, folder):

@@ -16,7 +16,7 @@ import numpy as np
 
 import signorini_results
 from elements import Pieces, counter_clockwise
-from expressions import evaluate
+from expressions import evaluate, with_values
 from results import ContactCurve, ResultError, Results, of_material, read_table, without_roundoff
 
 
@@ -56,6 +56,7 @@ def read_results(folder, time=None, material=None):
     run = open_run(folder)
     with whole(run.folder / "scene.toml") as file:
         scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        scene = with_values(scene, run.folder)
     chosen = run.frames[-1 if time is None else nearest(run.frames, time)]
     fields = read_frame(chosen[1])
     try:

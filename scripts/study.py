@@ -5,8 +5,8 @@ table.
     signorini study geo/lshape.toml --set material.young=1e5,2e5,4e5 --set mesh.size=0.5,0.25
     signorini study geo/lshape.toml --cases cases.csv
 
-Each row of cases.csv is a run; the columns are keys, and an empty cell leaves a key as it is. Each run has a folder
-below OUT, named by its values; OUT/study.csv is the table. A study that was interrupted goes on: runs that are complete
+Each row of cases.csv is a run; the columns are keys or names of constants, and an empty cell leaves a key as it is. Each run
+has a folder below OUT, named by its values, or by the column `label`; OUT/study.csv is the table. A study that was interrupted goes on: runs that are complete
 are not repeated, unless the scene or its files have changed. Studies with the same OUT, also on several machines,
 divide the runs: each waits at its end for those that another has started. Runs write no frames (output.every = 0),
 unless --frames or a --set asks for them; those of one run are made by `signorini run OUT/NAME/scene.toml --set
@@ -33,6 +33,8 @@ from pathlib import Path
 from signorini_summaries import COLUMNS, rows_of, summary_of
 from table import names_of, printed, refused, write_table
 
+# The column of --cases that names the runs.
+LABEL = "label"
 # The longest name of a folder.
 LONGEST = 120
 
@@ -62,7 +64,8 @@ def values_of(text):
 
 
 def cases_of(path):
-    """The keys and, for each row of a CSV file, the keys with their values; empty cells are left out."""
+    """The keys of a CSV file without `label`, and for each row: its label, and the keys with their values; empty cells are
+    left out."""
     def refuse(problem):
         raise argparse.ArgumentTypeError(f"{path}: {problem}")
 
@@ -85,32 +88,39 @@ def cases_of(path):
         if len(row) != len(head):
             refuse(f"line {line} has {len(row)} cells and the head {len(head)}; leave cells empty between commas, and put "
                    "values with commas in quotes")
-    cases = {}
+    cases, labels = {}, {}
     for line, row in rows:
-        case = tuple((key, value) for key, value in zip(head, row) if value)
+        case = tuple((key, value) for key, value in zip(head, row) if value and key != LABEL)
         if case in cases:
             refuse(f"lines {cases[case]} and {line} are the same run; remove one of them")
         cases[case] = line
-    return head, list(map(list, cases))
+        label = dict(zip(head, row)).get(LABEL, "")
+        if label and label in labels:
+            refuse(f"lines {labels[label]} and {line} have the label {label}; give each run its own")
+        labels[label] = line
+    found = [dict(zip(head, row)).get(LABEL, "") for _, row in rows]
+    return [key for key in head if key != LABEL], list(zip(found, map(list, cases)))
 
 
 def names_for(runs):
-    """The names of the runs' folders from their values. Names that would be too long or equal end with a checksum."""
-    def plain(chosen):
-        parts = [f"{key.rpartition('.')[2]}={value}" for key, value in chosen]
+    """The names of the runs' folders from their labels and values. Names that would be too long or equal end with a
+    checksum."""
+    def plain(run):
+        label, values = run
+        parts = [*filter(None, [label]), *(f"{key.rpartition('.')[2]}={value}" for key, value in values)]
         return re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__")) or "run"
 
     counts = Counter(map(plain, runs))
     return [name if len(name) <= LONGEST and counts[name] == 1
-            else f"{name[:LONGEST - 9]}-{zlib.crc32(str(chosen).encode()):08x}"
-            for chosen, name in zip(runs, map(plain, runs))]
+            else f"{name[:LONGEST - 9]}-{zlib.crc32(str(run).encode()):08x}"
+            for run, name in zip(runs, map(plain, runs))]
 
 
 def inputs_of(scene):
     """The scene's file, its mesh or geometry, and its tables; those that exist."""
     scene = Path(scene)
     text = scene.read_text(encoding="utf-8") if scene.exists() else ""
-    names = re.findall(r"""["']([^"'()]+\.(?:geo|msh|csv))["']|table\(["']([^"']+)["']""", text)
+    names = re.findall(r"""["']([^"'()]+\.(?:geo|msh|csv))["']|(?:table|spline)\(["']([^"']+)["']""", text)
     files = [scene, *(scene.parent / name for pair in names for name in pair if name)]
     return [file for file in files if file.exists()]
 
@@ -219,7 +229,7 @@ def main(prog=None):
     parser.add_argument("scene", metavar="SCENE")
     parser.add_argument("--set", action="append", type=values_of, default=[], metavar="KEY=A,B,…",
                         help="values of a key; may be repeated")
-    parser.add_argument("--cases", type=cases_of, default=([], [[]]), metavar="FILE.csv", help=(
+    parser.add_argument("--cases", type=cases_of, default=([], [("", [])]), metavar="FILE.csv", help=(
         "a run for each row; with --set, one for each row and value"))
     parser.add_argument("--out", type=Path, metavar="DIR", help="default: out/SCENE-study")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help=(
@@ -239,8 +249,10 @@ def main(prog=None):
     extra = [] if arguments.frames or "output.every" in head + keys else [("output.every", "0")]
     out = arguments.out or Path("out") / f"{Path(arguments.scene).stem}-study"
     products = [list(zip(keys, values)) for values in itertools.product(*(values for _, values in arguments.set))]
-    chosen = [case + product for case in cases for product in products]
-    folders = [out / name for name in names_for(chosen)]
+    chosen = [case + product for _, case in cases for product in products]
+    # A label stands for the values of its row.
+    named = [(label, product if label else case + product) for label, case in cases for product in products]
+    folders = [out / name for name in names_for(named)]
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
     failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs)
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]

@@ -1,7 +1,7 @@
 //! Suggestions for unknown names in messages.
 
 /// Longer lists of names are not shown.
-const LIST: usize = 16;
+const LIST: usize = 20;
 
 /// The end of a message about an unknown `name`: the most similar `known` name, and the list of all, or of the nearest three
 /// of many.

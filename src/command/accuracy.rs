@@ -2,7 +2,7 @@
 
 use super::{Failure, screen, task::Task};
 use signorini::{
-    estimate::{self, AdaptError, Adapted, Extreme, Measured},
+    estimate::{self, AdaptError, Adapted, Extreme, KINKS_OF_TABLE, Measured},
     evolution::{AIM, Choices, Outcome, Step, percent},
     interrupt::Signal,
     mesh::{Mesh, Order},
@@ -157,6 +157,13 @@ pub(super) fn hidden_damage(task: &Task, last: &Step, extremes: &[Extreme]) -> O
         "no damage on this mesh, but the stress is singular at {point}: on finer ones it may exceed the threshold of \
          the damage there, which the error bars do not contain"
     ))
+}
+
+/// A note on a pressure that shows the kinks of a table.
+pub(super) fn kinks_of_table(extremes: &[Extreme]) -> Option<String> {
+    let mut reasons = extremes.iter().filter_map(|of| of.unresolved.as_ref());
+    let reason = reasons.find(|reason| reason.ends_with(KINKS_OF_TABLE))?;
+    Some(format!("the contact pressure is not resolved ({reason})"))
 }
 
 /// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve

@@ -168,6 +168,7 @@ impl<'a> Recorder<'a> {
         let outcome = result.as_ref().ok();
         let mut notes = notes(task, outcome);
         notes.extend(last.iter().filter_map(|step| accuracy::hidden_damage(task, step, &extremes)));
+        notes.extend(accuracy::kinks_of_table(&extremes));
         let warnings = notes.len();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         if result.is_ok() {

@@ -5,8 +5,12 @@ use crate::{
     model::von_mises,
     petsc::PetscError,
     problem::{ContactRow, DiscreteProblem, NodalStress, Of, Singular, State, Value},
+    scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
+
+/// Why a pressure is not resolved below a gap with a table of the place.
+pub const KINKS_OF_TABLE: &str = "the gap's table has kinks; spline(\"…\") is smooth";
 
 /// An extreme of a state.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,13 +114,23 @@ impl<'a> Extremes<'a> {
     ) -> Result<Vec<Extreme>, PetscError> {
         let mut all = Extremes::new(problem, state, values)?.named(&problem.singular_points());
         for extreme in &mut all {
-            let part = &problem.figures[problem.part_of(extreme.number, values)].name;
-            match measured.unsettled.contains(part) {
+            let part = &problem.figures[problem.part_of(extreme.number, values)];
+            match measured.unsettled.contains(&part.name) {
                 true if extreme.is_known() => {
                     extreme.unresolved = Some("the meshes do not settle it".to_owned())
                 }
                 false if !measured.bars.is_empty() => extreme.singular = None,
                 _ => {}
+            }
+            let shows_table = |of: &Boundary| {
+                let is_other = matches!(&part.of, Of::Boundary(name) if *name != of.name);
+                !is_other && of.gap().is_some_and(|gap| gap.distance.has_kinks_in_space())
+            };
+            if let Some(reason) = &mut extreme.unresolved
+                && part.is_pressure()
+                && problem.scene().boundaries.iter().any(shows_table)
+            {
+                *reason += &format!(": {KINKS_OF_TABLE}");
             }
         }
         Ok(all)

@@ -24,7 +24,8 @@ mod simulation;
 pub use adaptive::{
     AdaptError, Adapted, INSTANTS, Measured, adapted, first_mesh, kinks, measured_errors,
 };
-pub use extremes::{Extreme, Extremes};
+
+pub use extremes::{Extreme, Extremes, KINKS_OF_TABLE};
 pub use recovery::{EnergyError, RecoveredStrains};
 pub use simulation::Simulation;
 

@@ -1,11 +1,8 @@
 //! The scene file in a folder of results, which runs again from any folder.
 
-use super::{
-    Scene,
-    document::{EXPRESSIONS, absolute, map_tables},
-};
+use super::{Scene, document::absolute};
 use crate::mesh;
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 /// The first line of the file.
 const FIRST_LINE: &str = "# As run by signorini; the results stand beside it.";
@@ -40,16 +37,20 @@ impl Scene {
     /// geometry that reads other files keeps its full path; so does a mesh file if the run writes no frames.
     pub fn as_run(&self) -> AsRun {
         let mut scene = self.text.document.clone();
-        let mut copies = Vec::new();
-        for key in EXPRESSIONS {
-            let mut name = |file: &str| {
-                let number = self.text.tables.iter().position(|(path, _)| path == file)?;
-                let name = format!("scene-table{}.csv", number + 1);
-                copies.push((name.clone(), PathBuf::from(file)));
-                Some(name)
-            };
-            scene.get_mut(key).into_iter().for_each(|value| map_tables(value, &mut name));
-        }
+        let (mut copies, mut tables) = (Vec::new(), Vec::new());
+        let mut name = |file: &str| {
+            let path = absolute(&self.text.folder().join(file));
+            // Reading a device might never end.
+            let content = path.is_file().then(|| fs::read(&path).ok()).flatten()?;
+            let known = copies.iter().position(|(_, known)| *known == path);
+            let name = format!("scene-table{}.csv", known.unwrap_or(copies.len()) + 1);
+            if known.is_none() {
+                tables.extend(content);
+                copies.push((name.clone(), path));
+            }
+            Some(name)
+        };
+        scene.iter_mut().for_each(|(_, value)| map_tables(value, &mut name));
         scene.insert("title".into(), self.title.clone().into());
         let source = &self.mesh.file;
         let has = |ending: &str| source.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
@@ -60,15 +61,32 @@ impl Scene {
         let full = || absolute(source).to_string_lossy().into_owned();
         let file = copy.map_or_else(full, str::to_owned);
         copies.extend(copy.map(|name| (name.to_owned(), source.clone())));
-        let mut mesh = toml::Table::new();
+        // A mesh from the command line has no parameters.
+        let written = scene.get("mesh").and_then(toml::Value::as_table).cloned();
+        let mut mesh = written.filter(|_| !self.mesh.parameters.is_empty()).unwrap_or_default();
         mesh.insert("file".into(), file.into());
-        let mut parameters = self.mesh.parameters.clone();
-        mesh.extend(parameters.remove("size").map(|size| ("size".into(), size.into())));
-        if !parameters.is_empty() {
-            mesh.insert("parameters".into(), parameters.into());
-        }
         scene.insert("mesh".into(), mesh.into());
-        let tables = self.text.tables.iter().flat_map(|(_, content)| content).copied().collect();
         AsRun { text: format!("{FIRST_LINE}\n{scene}"), copies, tables }
+    }
+}
+
+/// Replaces the names of files in `table("file")` by those that `map` returns.
+fn map_tables(value: &mut toml::Value, map: &mut impl FnMut(&str) -> Option<String>) {
+    match value {
+        toml::Value::String(text) => {
+            // Only names of files are quoted in an expression.
+            for quote in ["\"", "'"] {
+                let parts = text.split(quote).enumerate().map(|(i, part)| match i % 2 {
+                    0 => part.into(),
+                    _ => map(part).unwrap_or_else(|| part.into()),
+                });
+                *text = parts.collect::<Vec<String>>().join(quote);
+            }
+        }
+        toml::Value::Array(values) => values.iter_mut().for_each(|value| map_tables(value, map)),
+        toml::Value::Table(table) => {
+            table.iter_mut().for_each(|(_, value)| map_tables(value, map));
+        }
+        _ => {}
     }
 }

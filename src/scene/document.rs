@@ -2,7 +2,6 @@
 //! where it is written.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -12,10 +11,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{MOST_SHOWN, SceneError};
+use super::schema::is_key;
 use crate::suggestion::suggestion;
-
-/// The tables with expressions.
-pub(super) const EXPRESSIONS: [&str; 3] = ["body", "boundary", "damage"];
 
 /// The full path of a file.
 pub(super) fn absolute(file: &Path) -> PathBuf {
@@ -55,19 +52,28 @@ pub(super) struct SceneText {
     stride: usize,
     /// The places of the values that have been read, by their full keys.
     pub(super) places: BTreeMap<String, Range<usize>>,
-    /// The values, and the full paths and contents of the files of tables, from [`Self::values`].
+    /// The values as written, from [`Self::values`].
     pub(super) document: toml::Table,
-    pub(super) tables: Vec<(String, Vec<u8>)>,
 }
 
 impl SceneText {
     /// The content of the `file` at `path` and the `--set` arguments. A value of an argument that is not TOML
-    /// becomes a string, so that shells need no second pair of quotes.
+    /// becomes a string, so that shells need no second pair of quotes. The name of a constant of the file stands for the
+    /// constant if it is no key.
     pub(super) fn new(path: &Path, file: &str, sets: &[String]) -> Self {
         let stride = sets.iter().map(String::len).fold(file.len(), usize::max) + 2;
-        let toml = |set: &String| match (DeTable::parse(set), set.split_once('=')) {
-            (Err(_), Some((key, value))) => format!("{key}={}", toml::Value::from(value.trim())),
-            _ => set.clone(),
+        let root = DeTable::parse_recoverable(file).0.into_inner();
+        let constants = root.get("constants").map(Spanned::get_ref);
+        let toml = |set: &String| {
+            let (key, value) = set.split_once('=').unwrap_or((set, ""));
+            let is_constant = constants.is_some_and(|all| all.get(key.trim()).is_some());
+            let of = if is_constant && !is_key(key.trim()) { "constants." } else { "" };
+            match DeTable::parse(set) {
+                Err(_) if set.contains('=') => {
+                    format!("{of}{key}={}", toml::Value::from(value.trim()))
+                }
+                _ => format!("{of}{set}"),
+            }
         };
         let indented = |(i, set)| " ".repeat((i + 1) * stride) + &toml(set);
         Self {
@@ -133,24 +139,10 @@ impl SceneText {
         self.places.get(key).cloned().unwrap_or(NOWHERE)
     }
 
-    /// The values of a document with the full paths of tables, and these tables. The values are empty if a number
-    /// does not fit its type.
-    pub(super) fn values(&self, root: &DeValue) -> (toml::Table, Vec<(String, Vec<u8>)>) {
+    /// The values of a document. They are empty if a number does not fit its type.
+    pub(super) fn values(root: &DeValue) -> toml::Table {
         let root = Spanned::new(NOWHERE, root.clone()).into_deserializer();
-        let mut document = toml::Table::deserialize(root).unwrap_or_default();
-        let mut tables = Vec::new();
-        let mut complete = |name: &str| {
-            let file = self.folder().join(name);
-            // Reading a device might never end.
-            let content = file.is_file().then(|| fs::read(&file).ok()).flatten()?;
-            let path = absolute(&file).to_string_lossy().into_owned();
-            tables.push((path.clone(), content));
-            Some(path)
-        };
-        for key in EXPRESSIONS {
-            document.get_mut(key).into_iter().for_each(|value| map_tables(value, &mut complete));
-        }
-        (document, tables)
+        toml::Table::deserialize(root).unwrap_or_default()
     }
 
     /// The line that contains the byte `at`, and its first byte.
@@ -280,6 +272,14 @@ impl SceneText {
                     ));
                 }
                 (there, value) => match (there.is_some(), &mut *old) {
+                    (false, DeValue::Table(table))
+                        if key.split('.').next() == Some("constants") && !is_braced =>
+                    {
+                        let known =
+                            table.keys().filter(|_| key != "constants").map(Spanned::get_ref);
+                        let suggestion = suggestion(name.get_ref(), &known.collect::<Vec<_>>());
+                        return Err(format!("{key}: the file has no such constant{suggestion}"));
+                    }
                     (_, DeValue::Table(table)) => {
                         // The old key has the place of the old value.
                         table.remove(&name);
@@ -295,24 +295,6 @@ impl SceneText {
             }
         }
         Ok(())
-    }
-}
-
-/// Replaces the names of files in `table("file")` by those that `map` returns.
-pub(super) fn map_tables(value: &mut toml::Value, map: &mut impl FnMut(&str) -> Option<String>) {
-    match value {
-        toml::Value::String(text) if text.contains("table") => {
-            // Only names of files are quoted in an expression.
-            for quote in ["\"", "'"] {
-                let parts = text.split(quote).map(|part| map(part).unwrap_or_else(|| part.into()));
-                *text = parts.collect::<Vec<String>>().join(quote);
-            }
-        }
-        toml::Value::Array(values) => values.iter_mut().for_each(|value| map_tables(value, map)),
-        toml::Value::Table(table) => {
-            table.iter_mut().for_each(|(_, value)| map_tables(value, map));
-        }
-        _ => {}
     }
 }
 

@@ -8,10 +8,17 @@ mod table;
 use interval::{Enclosure, Enclosure2};
 use parser::Parser;
 use serde::Deserialize;
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 use table::Table;
 use toml::Value;
 
+pub(super) use parser::refused_name;
+
+/// The problem of an expression in the place of a number.
+pub(super) const NOT_CONSTANT: &str = "must be a constant, without x, y and t";
 /// The largest allowed length of an expression, bytes. A run evaluates it at many points and times.
 const MAX_LENGTH: usize = 20_000;
 /// The deepest allowed nesting, so that parsing cannot exhaust the stack of the program.
@@ -24,14 +31,15 @@ const HIGHEST: usize = 2 * DEEPEST;
 ///
 /// Known are the variables `x`, `y`, `t`, the constant `pi`, the operators `+ - * / ^`, the
 /// comparisons `< <= > >= == !=`, `and`, `or`, and the functions `sin cos tan sqrt exp log abs min max
-/// atan2 if table` (`log` is natural; `min`, `max` and `atan2` take two arguments). Precedence is that
+/// atan2 if table spline` (`log` is natural; `min`, `max` and `atan2` take two arguments). Precedence is that
 /// of mathematics: `-x^2` is −(x²), `2^3^2` is 2^(3²), and `t < 1 and x > 2` needs no brackets.
 ///
 /// A true comparison is 1, a false one 0, and any number except 0 counts as true. `if(c, a, b)` is a where c
 /// is true and b elsewhere; the value of the other one does not matter there. `table("file.csv")` is
 /// piecewise linear in t, `table("file.csv", a)` in a, through the two columns of a file. It is constant
 /// before the first row and after the last. Two rows with the same first number make a jump, at which the
-/// second row counts. A NaN in an argument gives NaN, except in the argument that `if` does not use.
+/// second row counts. `spline` is the same with a monotone cubic function between two rows, whose derivative is continuous
+/// except at jumps. A NaN in an argument gives NaN, except in the argument that `if` does not use.
 ///
 /// ```
 /// use signorini::scene::Expression;
@@ -41,7 +49,7 @@ const HIGHEST: usize = 2 * DEEPEST;
 /// # Ok::<(), signorini::scene::ExpressionError>(())
 /// ```
 #[derive(Debug, Clone, Deserialize)]
-#[serde(try_from = "Value")]
+#[serde(try_from = "(Value, PathBuf, toml::Table)")]
 pub struct Expression {
     /// Instructions in postfix order. A number or variable is pushed on a stack. A function or operator pops
     /// its arguments and pushes its value.
@@ -50,11 +58,41 @@ pub struct Expression {
     height: usize,
 }
 
-impl TryFrom<Value> for Expression {
+/// What the names in an expression refer to.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scope {
+    /// The folder to which paths of tables are relative.
+    pub(super) folder: PathBuf,
+    /// The constants by name. One that is not a float has no value.
+    pub(super) constants: toml::Table,
+}
+
+impl Scope {
+    /// The scope of a scene in a `folder` with `constants` as written. Numbers take the place of their expressions, which may
+    /// name each other in any order, as a table of TOML has none. A constant without a value stays as it is.
+    pub(super) fn new(folder: &Path, constants: toml::Table) -> Self {
+        let mut scope = Self { folder: folder.to_owned(), constants };
+        loop {
+            let open = scope.constants.iter().filter(|(_, written)| !written.is_float());
+            let number = |written| Expression::number(written, &scope).ok();
+            let found = open.filter_map(|(name, of)| Some((name.clone(), number(of)?.into())));
+            let found: Vec<(String, Value)> = found.collect();
+            if found.is_empty() {
+                return scope;
+            }
+            scope.constants.extend(found);
+        }
+    }
+}
+
+/// An expression as written, the folder of its tables, and the constants of its scene.
+impl TryFrom<(Value, PathBuf, toml::Table)> for Expression {
     type Error = ExpressionError;
 
-    fn try_from(written: Value) -> Result<Self, ExpressionError> {
-        Self::from_toml(&written, Path::new(""))
+    fn try_from(
+        (written, folder, constants): (Value, PathBuf, toml::Table),
+    ) -> Result<Self, ExpressionError> {
+        Self::from_toml(&written, &Scope { folder, constants })
     }
 }
 
@@ -96,22 +134,30 @@ impl Expression {
     /// A syntax error with its column, an unknown name or function, or a table that cannot be read, with its
     /// file and line.
     pub fn parse_in(text: &str, folder: &Path) -> Result<Self, ExpressionError> {
-        let program = Parser::parse(text, folder).map_err(ExpressionError)?;
-        let heights = program.iter().scan(0, |height, instruction| {
-            *height = *height + 1 - instruction.takes();
-            Some(*height)
-        });
-        Ok(Self { height: heights.max().unwrap_or(0), program })
+        Self::from_toml(&text.into(), &Scope { folder: folder.to_owned(), ..Scope::default() })
     }
 
     /// The expression in a scene: a number, or a text as for [`Expression::parse_in`].
-    pub(super) fn from_toml(written: &Value, folder: &Path) -> Result<Self, ExpressionError> {
+    pub(super) fn from_toml(written: &Value, scope: &Scope) -> Result<Self, ExpressionError> {
         match written {
-            Value::String(text) => Self::parse_in(text, folder),
+            Value::String(text) => {
+                let program = Parser::parse(text, scope).map_err(ExpressionError)?;
+                let heights = program.iter().scan(0, |height, instruction| {
+                    *height = *height + 1 - instruction.takes();
+                    Some(*height)
+                });
+                Ok(Self { height: heights.max().unwrap_or(0), program })
+            }
             Value::Float(value) => Ok(Self::constant(*value)),
             Value::Integer(value) => Ok(Self::constant(*value as f64)),
             _ => Err(ExpressionError("must be a number or an expression in quotes".to_owned())),
         }
+    }
+
+    /// The number in a scene: itself, or an expression of constants.
+    pub(super) fn number(written: &Value, scope: &Scope) -> Result<f64, ExpressionError> {
+        let number = Self::from_toml(written, scope)?.as_constant();
+        number.ok_or_else(|| ExpressionError(NOT_CONSTANT.to_owned()))
     }
 
     /// As [`Expression::parse_in`], in the working directory.
@@ -168,6 +214,18 @@ impl Expression {
     /// Whether the expression contains t.
     pub fn depends_on_time(&self) -> bool {
         self.program.iter().any(|instruction| matches!(instruction, Variable(2)))
+    }
+
+    /// Does the expression contain a `table` of x or y, which has kinks at its points?
+    pub fn has_kinks_in_space(&self) -> bool {
+        // Per value on the stack: does it depend on x or y?
+        let mut stack = Vec::new();
+        self.program.iter().any(|instruction| {
+            let arguments = stack.split_off(stack.len() - instruction.takes());
+            let in_space = matches!(instruction, Variable(0 | 1)) || arguments.contains(&true);
+            stack.push(in_space);
+            in_space && matches!(instruction, Instruction::Table(table) if table.has_kinks())
+        })
     }
 
     /// Whether the expression contains x or y.

@@ -229,12 +229,12 @@ impl Scene {
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let mut text = SceneText::new(path, text, overrides);
         let root = text.parse()?;
-        let (document, tables) = text.values(&root);
+        let document = SceneText::values(&root);
         let mut found = Diagnostics::check(&text, &root, &document);
         let scene = tables::scene(&mut found);
         let Diagnostics { problems, places, .. } = found;
         text.refuse(problems)?;
-        (text.places, text.document, text.tables) = (places, document, tables);
+        (text.places, text.document) = (places, document);
         // Without problems there is a scene.
         let scene = scene.ok_or_else(|| SceneError(Vec::new()))?;
         Ok(Self { text, ..scene })

@@ -1,8 +1,8 @@
-//! Checks a scene file against the JSON schema of scenes, key by key. The check collects the problems and goes
-//! on, so that one message lists all problems of a scene.
+//! Reads the values of a scene file by the JSON schema of scenes, key by key. Here alone a number, or an expression of
+//! constants in its place, is read. The problems are collected, so that one message lists all problems of a scene.
 
 use super::document::{NOWHERE, Problem, SceneText, below, name_of, with_decimal_comma};
-use super::expression::Expression;
+use super::expression::{Expression, NOT_CONSTANT, Scope, refused_name};
 use crate::suggestion::suggestion;
 use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
 use serde_json::Value as Schema;
@@ -10,11 +10,10 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Display,
     ops::Range,
-    path::Path,
     sync::LazyLock,
 };
-use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
+use toml::{Spanned, Value};
 
 /// The JSON schema of scenes. It has six additional words: `values` describes the values in messages, `absent` the
 /// behaviour without the key, `example` a value, `format` the kind of an expression, `also` other usual names of the
@@ -22,6 +21,16 @@ use toml::de::{DeArray, DeTable, DeValue};
 pub const SCHEMA: &str = include_str!("../../geo/scene.schema.json");
 
 static ROOT: LazyLock<Schema> = LazyLock::new(|| serde_json::from_str(SCHEMA).unwrap_or_default());
+
+/// The type of a value. A number may also be a string: an expression of constants.
+fn type_of(schema: &Schema) -> Option<&str> {
+    schema["type"].as_str().or(schema["type"][0].as_str())
+}
+
+/// Is `name` a key at the top of a scene?
+pub(super) fn is_key(name: &str) -> bool {
+    ROOT["properties"].get(name).is_some()
+}
 
 /// The keys of the elements of the list `table`.
 pub(super) fn keys_of_element(table: &str) -> impl Iterator<Item = &'static str> {
@@ -52,8 +61,9 @@ pub(super) type Diagnostic = (&'static str, String);
 /// A document and its problems.
 pub(super) struct Diagnostics<'t> {
     pub(super) text: &'t SceneText,
+    scope: Scope,
     /// The values, completed by defaults.
-    document: toml::Value,
+    document: Value,
     pub(super) problems: Vec<Problem>,
     /// The places of the values, by their full keys.
     pub(super) places: BTreeMap<String, Range<usize>>,
@@ -62,14 +72,15 @@ pub(super) struct Diagnostics<'t> {
 }
 
 impl<'t> Diagnostics<'t> {
-    /// Checks the document of `text`: `root` has the places, `document` the values.
+    /// Reads the document of `text`: `root` has the places, `document` the values.
     pub(super) fn check(text: &'t SceneText, root: &DeValue, document: &toml::Table) -> Self {
-        let mut document = toml::Value::Table(document.clone());
-        complete(&mut document, &ROOT);
+        let constants = document.get("constants").and_then(Value::as_table).cloned();
+        let scope = Scope::new(text.folder(), constants.unwrap_or_default());
         let (problems, places, unsound) = Default::default();
-        let mut findings = Self { text, document, problems, places, unsound };
-        findings.check_value(String::new(), NOWHERE, root, &ROOT);
-        findings
+        let document = Value::Boolean(false);
+        let mut found = Self { text, scope, document, problems, places, unsound };
+        found.document = found.read(String::new(), root, &ROOT);
+        found
     }
 
     /// Adds a problem of a key; the message begins with the key.
@@ -82,54 +93,74 @@ impl<'t> Diagnostics<'t> {
         self.problems.push((self.places.get(key).cloned().unwrap_or(NOWHERE), problem));
     }
 
-    fn check_value(&mut self, key: String, place: Range<usize>, value: &DeValue, schema: &Schema) {
+    /// Checks a value against its schema and returns what it means: a number for an expression of constants, and
+    /// defaults for missing keys. A wrong value becomes `false`.
+    fn read(&mut self, key: String, value: &DeValue, schema: &Schema) -> Value {
         let same = schema["$ref"].as_str().and_then(|path| ROOT.pointer(&path[1..]));
         let schema = same.unwrap_or(schema);
-        self.places.insert(key.clone(), place);
         let before = self.problems.len();
-        match (value, schema["type"].as_str()) {
-            (DeValue::Table(table), Some("object")) => self.check_table(&key, table, schema),
-            (DeValue::Array(array), Some("array")) => self.check_array(&key, array, schema),
+        let read = match (value, schema["type"].as_str()) {
+            (DeValue::Table(table), Some("object")) => Ok(self.read_table(&key, table, schema)),
+            (DeValue::Array(array), Some("array")) => self.read_array(&key, array, schema),
             (DeValue::Table(_), Some("array")) => {
-                self.note(&key, format!("is a list, each begins with [[{key}]]"));
+                Err(format!("is a list, each begins with [[{key}]]"))
             }
             _ => {
                 let value = Spanned::new(NOWHERE, value.clone()).into_deserializer();
-                let checked = toml::Value::deserialize(value)
+                Value::deserialize(value)
                     .map_err(|_| "is a number beyond 64 bits; write a smaller one".to_owned())
-                    .and_then(|value| check_value(&value, schema, self.text.folder()));
-                checked.err().into_iter().for_each(|problem| self.note(&key, problem));
+                    .and_then(|value| read_value(&value, schema, &self.scope))
             }
-        }
+        };
+        let read = read.unwrap_or_else(|problem| {
+            self.note(&key, problem);
+            false.into()
+        });
         if self.problems.len() > before {
             self.unsound.insert(key);
         }
+        read
     }
 
-    /// Notes unknown and missing keys of the table `key`, and checks its values against their schemas.
-    fn check_table(&mut self, key: &str, table: &DeTable, schema: &Schema) {
-        let mut is_misspelt = false;
+    /// Notes unknown and missing keys of the table `key`, and reads its values by their schemas.
+    fn read_table(&mut self, key: &str, table: &DeTable, schema: &Schema) -> Value {
+        let (mut is_misspelt, mut read) = (false, toml::Table::new());
         for (name, value) in table {
             // The place of a table is its header.
             let span = value.span();
             let start = if value.get_ref().is_table() { span.start } else { name.span().start };
-            let (key, place, value) =
-                (below(key, name.get_ref()), start..span.end, value.get_ref());
+            let (name, place, value) = (name.get_ref(), start..span.end, value.get_ref());
+            let refused = refused_name(name).filter(|_| key == "constants");
+            let key = below(key, name);
+            if let Some(problem) = refused {
+                self.problems.push((place.clone(), format!("{key} {problem}")));
+            }
             // The keys of this table are names of the user.
             let named = &schema["additionalProperties"];
-            let is_named = named["type"] == "number" || (named.is_object() && value.is_table());
-            match schema["properties"].get(&**name.get_ref()) {
+            let is_named = named.is_object() && (named["type"] != "object" || value.is_table());
+            let schema = match schema["properties"].get(&**name) {
                 Some(_) if is_named => {
                     let problem = "has the name of a key; give the physical surface another name";
                     self.problems.push((place, format!("{key} {problem}")));
+                    continue;
                 }
-                Some(schema) => self.check_value(key, place, value, schema),
-                None if is_named => self.check_value(key, place, value, named),
-                None => {
-                    let suggestion = known_as(schema, name.get_ref(), value);
+                None if !is_named => {
+                    let suggestion = known_as(schema, name, value);
                     is_misspelt |= suggestion.contains("did you mean");
                     self.problems.push((place, format!("unknown key {key}{suggestion}")));
+                    continue;
                 }
+                schema => schema.unwrap_or(named),
+            };
+            self.places.insert(key.clone(), place);
+            read.insert(name.to_string(), self.read(key, value, schema));
+        }
+        for (name, schema) in schema["properties"].as_object().into_iter().flatten() {
+            let text = format!("default={}", schema["default"]);
+            // Without a default this is `null`, which is not TOML.
+            if let (false, Ok(default)) = (table.contains_key(&**name), DeTable::parse(&text)) {
+                let default = default.get_ref()["default"].get_ref();
+                read.insert(name.clone(), self.read(below(key, name), default, schema));
             }
         }
         // A misspelt key is probably the missing one.
@@ -139,26 +170,29 @@ impl<'t> Diagnostics<'t> {
                 self.note_at(key, format!("{} is required but missing", below(key, name)));
             }
         }
+        Value::Table(read)
     }
 
-    /// Checks an array. Its tables are known by their names, which must differ.
-    fn check_array(&mut self, key: &str, array: &DeArray, schema: &Schema) {
+    /// Reads an array. Its tables are known by their names, which must differ.
+    fn read_array(&mut self, key: &str, array: &DeArray, schema: &Schema) -> Result<Value, String> {
         let count = array.len() as u64;
         if schema["maxItems"].as_u64().is_some_and(|all| count != all) {
-            return self.note(key, format!("must have two components, but has {count}"));
+            return Err(format!("must have two components, but has {count}"));
         }
         if schema["minItems"].as_u64().is_some_and(|least| count < least) {
-            return self.note(key, format!("must hold at least one {key}"));
+            return Err(format!("must hold at least one {key}"));
         }
-        let mut seen = BTreeMap::new();
+        let (mut seen, mut read) = (BTreeMap::new(), Vec::new());
         for (i, value) in array.iter().enumerate() {
             let element = key_of_element(key, i, name_of(value.get_ref()));
-            self.check_value(element.clone(), value.span(), value.get_ref(), &schema["items"]);
+            self.places.insert(element.clone(), value.span());
+            read.push(self.read(element.clone(), value.get_ref(), &schema["items"]));
             if let Some(first) = seen.insert(element.clone(), value.span()) {
                 let first = self.text.in_words(&first);
                 self.note(&element, format!("is given twice, first at {first}; merge the two"));
             }
         }
+        Ok(Value::Array(read))
     }
 
     /// The result of `build` for the value of a dotted `key`, if there is one and the schema allows it.
@@ -177,10 +211,10 @@ impl<'t> Diagnostics<'t> {
         key: &str,
         build: impl Fn(K) -> Result<T, Diagnostic>,
     ) -> Vec<T> {
-        let elements = self.document.get(key).and_then(toml::Value::as_array).cloned();
+        let elements = self.document.get(key).and_then(Value::as_array).cloned();
         let mut built = Vec::new();
         for (i, element) in elements.into_iter().flatten().enumerate() {
-            let key = key_of_element(key, i, element.get("name").and_then(toml::Value::as_str));
+            let key = key_of_element(key, i, element.get("name").and_then(Value::as_str));
             built.extend(self.build_value(&key, element, &build));
         }
         built
@@ -189,7 +223,7 @@ impl<'t> Diagnostics<'t> {
     fn build_value<K: DeserializeOwned, T>(
         &mut self,
         key: &str,
-        value: toml::Value,
+        value: Value,
         build: impl FnOnce(K) -> Result<T, Diagnostic>,
     ) -> Option<T> {
         if self.unsound.contains(key) {
@@ -213,48 +247,29 @@ pub(super) fn is_wrong(error: toml::de::Error) -> Diagnostic {
     ("", format!("is wrong: {}", error.message()))
 }
 
-/// Inserts the defaults of the schema for missing keys. Makes integers of whole numbers such as 2e4.
-fn complete(value: &mut toml::Value, schema: &Schema) {
-    match value {
-        toml::Value::Table(table) => {
-            for (name, schema) in schema["properties"].as_object().into_iter().flatten() {
-                if let (false, Ok(default)) =
-                    (table.contains_key(name), toml::Value::try_from(&schema["default"]))
-                {
-                    table.insert(name.clone(), default);
-                }
-                table.get_mut(name).into_iter().for_each(|value| complete(value, schema));
-            }
-        }
-        toml::Value::Array(values) => {
-            values.iter_mut().for_each(|value| complete(value, &schema["items"]));
-        }
-        toml::Value::Float(number) if schema["type"] == "integer" => {
-            *value = toml::Value::Integer(*number as i64);
-        }
-        _ => {}
-    }
-}
-
-/// Checks a text, number or flag against the schema. Paths of tables are relative to `folder`.
+/// Checks a text, number or flag against the schema and returns what it means. A string in a number's place is an
+/// expression of constants.
 ///
 /// # Errors
 /// The problem; if there are several alternatives, the problem of the last one.
-fn check_value(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<(), String> {
+fn read_value(value: &Value, schema: &Schema, scope: &Scope) -> Result<Value, String> {
+    let read = |schema: &Schema| read_value(value, schema, scope);
     if let Some([other, last]) = schema["anyOf"].as_array().map(Vec::as_slice) {
-        return check_value(value, other, folder).or_else(|_| check_value(value, last, folder));
+        return read(other).or_else(|_| read(last));
     }
-    let number = value.as_float().or(value.as_integer().map(|number| number as f64));
     if let Some(kind) = schema["format"].as_str() {
-        return check_expression(value, kind, folder);
+        return read_expression(value, kind, scope);
     }
+    let is_number = matches!(type_of(schema), Some("number" | "integer"));
+    let evaluated = is_number.then(|| Expression::number(value, scope));
+    let number = evaluated.iter().flatten().next().copied();
     let is = |choice: &Schema| match choice.as_str() {
         Some(name) => value.as_str() == Some(name),
         None => number.is_some() && number == choice.as_f64(),
     };
     let is_text = value.as_str().is_some_and(|text| !text.trim().is_empty());
     let rule = schema["values"].as_str().unwrap_or("finite");
-    let (wanted, holds) = match (schema["enum"].as_array(), schema["type"].as_str(), number) {
+    let (wanted, holds) = match (schema["enum"].as_array(), type_of(schema), number) {
         (Some(choices), ..) => {
             let names: Vec<String> = choices.iter().map(Schema::to_string).collect();
             (names.join(" or "), choices.iter().any(is))
@@ -270,19 +285,28 @@ fn check_value(value: &toml::Value, schema: &Schema, folder: &Path) -> Result<()
         _ => (format!("a number: {rule}"), false),
     };
     let found = match value {
-        toml::Value::Array(_) | toml::Value::Table(_) => String::new(),
-        toml::Value::Float(number) => format!(", but is {number:?}"),
-        toml::Value::String(text) if with_decimal_comma(text) == Some(text.len()) => {
+        Value::Array(_) | Value::Table(_) => String::new(),
+        Value::Float(number) => format!(", but is {number:?}"),
+        Value::String(text) if with_decimal_comma(text) == Some(text.len()) => {
             format!(", but is {value}: write a decimal point")
         }
-        toml::Value::String(text)
+        Value::String(text)
             if text.contains(',') && text.split(',').all(|part| part.parse::<f64>().is_ok()) =>
         {
             format!(", but is {value}: `signorini study` runs several values")
         }
-        value => format!(", but is {value}"),
+        _ => match evaluated.filter(|_| value.is_str()) {
+            Some(Ok(number)) => format!(", but is {value} = {number:?}"),
+            Some(Err(error)) if !scope.constants.is_empty() => format!(", but {value} {error}"),
+            _ => format!(", but is {value}"),
+        },
     };
-    if holds { Ok(()) } else { Err(format!("must be {wanted}{found}")) }
+    match number {
+        _ if !holds => Err(format!("must be {wanted}{found}")),
+        Some(number) if type_of(schema) == Some("integer") => Ok(Value::Integer(number as i64)),
+        Some(number) => Ok(Value::Float(number)),
+        None => Ok(value.clone()),
+    }
 }
 
 /// Whether a number is finite and within the bounds of the schema.
@@ -291,22 +315,23 @@ fn is_within(number: f64, schema: &Schema) -> bool {
         schema[bound].as_f64().is_none_or(|bound| holds(&number, &bound))
     };
     number.is_finite()
-        && (schema["type"] != "integer" || number.fract() == 0.0)
+        && (type_of(schema) != Some("integer") || number.fract() == 0.0)
         && obeys("minimum", f64::ge)
         && obeys("exclusiveMinimum", f64::gt)
         && obeys("maximum", f64::le)
         && obeys("exclusiveMaximum", f64::lt)
 }
 
-/// Checks that a value is an expression of this kind, and finite if it is constant.
-fn check_expression(value: &toml::Value, kind: &str, folder: &Path) -> Result<(), String> {
-    let expression = Expression::from_toml(value, folder).map_err(|error| error.to_string())?;
+/// Checks that a value is an expression of this kind, and finite if it is constant. Returns it with its scope.
+fn read_expression(value: &Value, kind: &str, scope: &Scope) -> Result<Value, String> {
+    let expression = Expression::from_toml(value, scope).map_err(|error| error.to_string())?;
     match expression.as_constant() {
         Some(value) if !value.is_finite() => Err(format!("must be finite, but is {value}")),
-        None if kind == "constant" => Err("must be a constant, without x, y and t".to_owned()),
+        None if kind == "constant" => Err(NOT_CONSTANT.to_owned()),
         None if kind == "expression in x, y" && expression.depends_on_time() => {
             Err("depends on t; it must be a function of x and y alone".to_owned())
         }
-        _ => Ok(()),
+        _ => Value::try_from((value, scope.folder.to_string_lossy(), &scope.constants))
+            .map_err(|error| error.to_string()),
     }
 }

@@ -148,6 +148,35 @@ fn a_pressure_on_few_nodes_or_under_a_kink_is_not_resolved_and_a_smooth_one_is()
     }
 }
 
+/// A profile given by points: a table of them presses with its kinks, which a note says, and a spline does not.
+#[test]
+fn kinks_of_a_table_are_named_where_the_pressure_shows_them() {
+    let directory = TestDirectory::new();
+    let rows = (0..=10).map(|i| f64::from(i) / 10.0);
+    let rows: String = rows.map(|x| format!("{x},{}\n", 0.1 * (x - 0.5).powi(2))).collect();
+    directory.write("profile.csv", &rows);
+    directory.write("square.msh", &crate::test_directory::square(40));
+    let note = "note          the contact pressure is not resolved (a kink of the gap of `bottom`: the gap's table has kinks";
+    for (gap, degree, expected) in [
+        ("table(\"profile.csv\", x)", 1, true),
+        ("table(\"profile.csv\", x)", 2, true),
+        ("spline(\"profile.csv\", x)", 2, false),
+        // A kink of its own.
+        ("0.02*abs(x - 0.5)", 2, false),
+    ] {
+        directory.write("scene.toml", &on(gap, degree, 0.03));
+        for words in [&[][..], &["--bars"]] {
+            let said = directory.run(words).out;
+            let flat = said.split_whitespace().collect::<Vec<_>>().join(" ");
+            let note = note.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert_eq!(flat.contains(&note), expected, "{gap}, {words:?}: {said}");
+            let found = &directory.summary("out/scene")["figures"]["pressure_max"];
+            let reason = found["unresolved"].as_str().unwrap_or_default();
+            assert_eq!(reason.ends_with("spline(\"…\") is smooth"), expected, "{gap}: {reason}");
+        }
+    }
+}
+
 #[test]
 fn a_pressure_that_is_not_resolved_has_no_bar() {
     let directory = TestDirectory::new();

@@ -39,6 +39,66 @@ fn a_study_runs_all_combinations_once_and_tells_their_figures() {
     directory.say(&words).fails(2, &["out/s/nothing/summary.json: No such file"]);
 }
 
+/// A study of constants: their names are keys and columns, runs are called after their values or their labels, and the
+/// scene as run keeps them.
+#[test]
+fn a_study_varies_constants_and_cases_have_labels() {
+    let directory = TestDirectory::new();
+    let text = directory
+        .read("scene.toml")
+        .replace("-3*t", "-load*t")
+        .replace("young = 80", "young = '8*E'");
+    let text = text
+        + "\n[constants]\nload = '2*v'\nv = 1\nE = 10\n[[probe]]\nname = 'p'\npoint = ['v/4', 0.5]\n";
+    directory.write("scene.toml", &text);
+    let study = |words: &[&str]| {
+        let words =
+            [&["study", "scene.toml", "--columns", "displacement_max", "--out", "out/s"], words]
+                .concat();
+        directory.say_python(&words)
+    };
+    let Some(said) = study(&["--set", "v=1,2", "--set", "constants.E=10"]) else { return };
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let rows = || {
+        let table = directory.read("out/s/study.csv");
+        let head = table.lines().next().expect("a head").to_owned();
+        let cells = table.lines().skip(1).map(|row| row.split(',').map(str::to_owned).collect());
+        (head, cells.collect::<Vec<Vec<String>>>())
+    };
+    let (head, cells) = rows();
+    assert!(head.starts_with("run,v,displacement_max"), "{head}");
+    assert_eq!([&cells[0][0], &cells[1][0]], ["v=1__E=10", "v=2__E=10"]);
+    let u = |row: &[String], k: usize| row[k].parse::<f64>().expect("a number");
+    assert!((u(&cells[1], 2) / u(&cells[0], 2) - 2.0).abs() < 0.05, "{cells:?}");
+    // The scene as run keeps the constants, for another run and for pictures.
+    let again =
+        directory.say(&["run", "out/s/v=1__E=10/scene.toml", "--set", "v=2", "--out", "out/again"]);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    let figure =
+        |folder: &str| directory.summary(folder)["figures"]["displacement_max"]["value"].clone();
+    assert_eq!(figure("out/again"), figure("out/s/v=2__E=10"));
+    directory.run(&["--set", "output.every=1"]);
+    let report = directory.say(&["report", "out/scene"]);
+    assert_eq!(report.code, Some(0), "{report:?}");
+    let page = directory.read("out/scene/report.html");
+    assert!(page.contains("E = 80 Pa"), "the value, not the name");
+
+    directory.write("cases.csv", "label,v,constants.E\nsoft one,,5\nstiff,2,\n");
+    let said = study(&["--cases", "cases.csv"]).expect("Python");
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let (head, cells) = rows();
+    assert!(head.starts_with("run,constants.E,v,displacement_max"), "{head}");
+    assert_eq!([&cells[0][0], &cells[1][0]], ["soft_one", "stiff"]);
+    let said = study(&["--cases", "cases.csv", "--set", "time.step=0.5,1"]).expect("Python");
+    assert!(said.code == Some(0) && said.out.contains("stiff__step=0.5"), "{said:?}");
+    directory.write("cases.csv", "label,v\nsoft,1\nsoft,2\n");
+    let said = study(&["--cases", "cases.csv"]).expect("Python");
+    assert!(
+        said.code == Some(2) && said.err.contains("lines 2 and 3 have the label soft"),
+        "{said:?}"
+    );
+}
+
 #[test]
 fn figures_stand_with_units_bars_and_singular_flags() {
     // The bar is rounded up, the figure to the bar's digit; a figure without a bar stands as it was, an extreme

@@ -418,3 +418,178 @@ fn malformed_tables_are_refused_with_their_line() {
         assert!(refusal.contains(fragment), "{content:?} {refusal}");
     }
 }
+
+/// The smooth function through points (a, f).
+fn spline(points: &[[f64; 2]]) -> impl Fn(f64) -> f64 + use<> {
+    let rows: Vec<String> = points.iter().map(|[a, f]| format!("{a:?},{f:?}")).collect();
+    let spline = table(&rows.join("\n"), "spline('load.csv', x)").expect("a spline");
+    move |x| spline.eval(x, 0.0, 0.0)
+}
+
+/// Points with random distances and values.
+fn random_points(random: &mut Random, count: usize) -> Vec<[f64; 2]> {
+    let mut a = random.next();
+    let next = |_| {
+        a += 1.2 + random.next();
+        // Equal values, too.
+        [a, (4.0 * random.next()).round() / 2.0]
+    };
+    (0..count).map(next).collect()
+}
+
+/// Values of scipy.interpolate.PchipInterpolator (SciPy 1.15).
+#[test]
+fn a_spline_is_the_function_of_other_programs() {
+    let f = spline(&[
+        [-2.0, 3.0],
+        [-1.5, 1.0],
+        [-0.25, -0.5],
+        [0.0, -0.5],
+        [0.75, 0.25],
+        [2.0, 0.125],
+        [2.125, 2.0],
+        [4.0, 2.5],
+    ]);
+    for (x, expected) in [
+        (-1.75, 1.825),
+        (-1.0, 0.112),
+        (-0.125, -0.5),
+        (0.5, 0.05555555555555558),
+        (1.25, 0.206),
+        (2.0625, 1.051104710053178),
+        (2.75, 2.332212562017576),
+        (3.9, 2.4995671844161205),
+    ] {
+        assert!((f(x) - expected).abs() < 1e-14, "{x}: {} is not {expected}", f(x));
+    }
+    let f = spline(&[[0.0, 0.0], [1.0, 5.0], [3.0, 4.0]]);
+    assert!((f(0.25) - 1.7421875).abs() < 1e-14 && (f(2.5) - 4.578125).abs() < 1e-14);
+    // Ends whose slopes are limited to 0.
+    let f = spline(&[[0.0, 0.0], [1.0, 1.0], [2.0, 5.0]]);
+    assert!((f(0.5) - 0.3).abs() < 1e-14);
+}
+
+/// Between two points the function goes from one value to the other without turning, and its derivative is continuous.
+#[test]
+fn a_spline_passes_its_points_without_overshoot_and_without_kinks() {
+    let mut random = Random::new(5);
+    for count in [1, 2, 3, 4, 9, 30] {
+        for _ in 0..40 {
+            let points = random_points(&mut random, count);
+            let f = spline(&points);
+            assert!(points.iter().all(|&[a, value]| f(a) == value), "{points:?}");
+            for pair in points.windows(2) {
+                let [[p, from], [q, to]] = [pair[0], pair[1]];
+                let at = |i: usize| f(p + (q - p) * i as f64 / 100.0);
+                let rises = (1..=100).map(|i| (at(i) - at(i - 1)) * (to - from).signum());
+                assert!(rises.into_iter().all(|rise| rise >= -1e-12), "{pair:?} in {points:?}");
+            }
+            let last = points.len().saturating_sub(1);
+            for [a, value] in points.iter().take(last).skip(1) {
+                let h = 1e-6;
+                let [before, after] = [(value - f(a - h)) / h, (f(a + h) - value) / h];
+                let scale = 1.0 + before.abs().max(after.abs());
+                assert!(
+                    (after - before).abs() < 0.02 * scale,
+                    "{before}, {after} at {a}: {points:?}"
+                );
+            }
+            let [[first, start], [last, end]] = [points[0], points[last]];
+            assert_eq!([f(first - 1.0), f(last + 1.0)], [start, end], "constant beyond the ends");
+        }
+    }
+}
+
+/// A jump divides the points: the functions on both sides know nothing of each other.
+#[test]
+fn a_spline_jumps_where_its_points_do() {
+    let [left, right] =
+        [[[0.0, 1.0], [1.0, 3.0], [2.0, 4.0]], [[2.0, -1.0], [3.0, 7.0], [5.0, 0.0]]];
+    let [f, g] = [left, right].map(|points| spline(&points));
+    let both = spline(&[left, right].concat());
+    [-1.0, 0.3, 1.5, 1.999].iter().for_each(|&x| assert_eq!(both(x), f(x), "{x}"));
+    [2.001, 2.7, 4.0, 6.0].iter().for_each(|&x| assert_eq!(both(x), g(x), "{x}"));
+    assert_eq!(both(2.0), -1.0);
+}
+
+/// Lines are exact. The error of a smooth function decreases with the third power of the distance of its points, that of a
+/// piecewise linear one with the second.
+#[test]
+fn a_spline_is_exact_for_lines_and_of_third_order_for_smooth_monotone_functions() {
+    let mut random = Random::new(6);
+    let mut points = random_points(&mut random, 12);
+    points.iter_mut().for_each(|[a, f]| *f = 3.0 - 0.7 * *a);
+    let (f, [first, last]) = (spline(&points), [points[0][0], points[11][0]]);
+    for i in 0..=200 {
+        let x = first + (last - first) * f64::from(i) / 200.0;
+        assert!((f(x) - (3.0 - 0.7 * x)).abs() < 1e-13, "{x}");
+    }
+    for (function, orders) in [("spline", 2.8..3.3), ("table", 1.9..2.1)] {
+        let error = |n: i32| {
+            let row = |i: i32| {
+                format!(
+                    "{0:?},{1:?}\n",
+                    f64::from(i) / f64::from(n),
+                    (f64::from(i) / f64::from(n)).exp()
+                )
+            };
+            let rows: String = (0..=n).map(row).collect();
+            let f = table(&rows, &format!("{function}('load.csv', x)")).expect("a table");
+            let errors = (0..=3000).map(|i| f64::from(i) / 3000.0);
+            errors.map(|x| (f.eval(x, 0.0, 0.0) - x.exp()).abs()).fold(0.0, f64::max)
+        };
+        let order = (error(20) / error(40)).log2();
+        assert!(orders.contains(&order), "{function}: {order}");
+    }
+}
+
+#[test]
+fn the_range_of_a_spline_has_all_its_values_and_is_reached() {
+    let mut random = Random::new(7);
+    for _ in 0..200 {
+        let points = random_points(&mut random, 7);
+        let rows: Vec<String> = points.iter().map(|[a, f]| format!("{a:?},{f:?}")).collect();
+        let f = table(&rows.join("\n"), "spline('load.csv', x)").expect("a spline");
+        let [from, length] = [8.0 + 8.0 * random.next(), 2.0 + 2.0 * random.next()];
+        let [low, high] = f.range([[from, from + length], [0.0; 2], [0.0; 2]]);
+        let samples = (0..=500).map(|i| f.eval(from + length * f64::from(i) / 500.0, 0.0, 0.0));
+        let [least, most] =
+            samples.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], f| [a.min(f), b.max(f)]);
+        assert!(low <= least && most <= high, "[{least}, {most}] in [{low}, {high}]");
+        assert!(least - low < 0.1 && high - most < 0.1, "[{low}, {high}] for [{least}, {most}]");
+    }
+}
+
+/// A smooth function of time has a break at a jump, and none of its points is one; those of a table are kinks.
+#[test]
+fn the_breaks_of_a_spline_are_its_jumps() {
+    let rows = "0,0\n0.5,0.2\n1,1\n1,5\n1.5,5.3\n2,6\n";
+    let breaks = |function: &str| {
+        let f = table(rows, &format!("{function}('load.csv')")).expect("a table");
+        f.breaks([[0.0; 2]; 2], 2.0)
+    };
+    assert_eq!(breaks("spline"), [1.0]);
+    // A pulse that is shorter than the parts that are searched.
+    let rows = "0,0\n0.7,0\n0.7005,3\n0.701,0\n2,0\n";
+    let f = table(rows, "spline('load.csv')").expect("a spline");
+    let breaks = f.breaks([[0.0; 2]; 2], 2.0);
+    let near = |time: f64| breaks.iter().any(|found| (found - time).abs() < 1e-4);
+    assert!(near(0.7005) && breaks.iter().all(|t| (0.69..0.71).contains(t)), "{breaks:?}");
+}
+
+/// Only a table of the place has kinks in space, at points between its ends.
+#[test]
+fn kinks_in_space_are_those_of_tables_of_the_place() {
+    let rows = "0,0\n1,1\n2,3\n";
+    for (rows, text, expected) in [
+        (rows, "table('load.csv', x)", true),
+        (rows, "-t*table('load.csv', 2*sqrt(x^2 + y^2)) + 1", true),
+        (rows, "if(t < 1, 0, table('load.csv', y))", true),
+        (rows, "spline('load.csv', x)", false),
+        (rows, "x + y*table('load.csv')", false),
+        (rows, "x^2 + table('load.csv', 2*t)", false),
+        ("0,0\n2,3\n", "table('load.csv', x)", false),
+    ] {
+        assert_eq!(table(rows, text).expect(text).has_kinks_in_space(), expected, "{text}");
+    }
+}

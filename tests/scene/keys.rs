@@ -101,7 +101,7 @@ fn remove(scene: &mut toml::Table, path: &[&str]) {
 }
 
 /// All that a scene says, without the text it was read from.
-fn content(scene: &Scene) -> String {
+pub fn content(scene: &Scene) -> String {
     format!("{scene:?}").split("text: SceneText").next().expect("a part").to_owned()
 }
 
@@ -134,7 +134,9 @@ fn defaults_are_what_is_read_where_a_key_is_left_out() {
 #[test]
 fn the_rule_of_a_number_in_words_is_that_of_its_bounds() {
     let bounds = ["minimum", "exclusiveMinimum", "maximum", "exclusiveMaximum"];
-    let numbers = keys().into_iter().filter(|(_, key, _)| key["type"] == "number");
+    let numbers = keys()
+        .into_iter()
+        .filter(|(_, key, _)| key["type"][0] == "number" && key["format"].is_null());
     let checked = numbers.map(|(path, key, _)| {
         let rule = key["values"].as_str().expect("words").split(" (").next().expect("a rule");
         let expected = match rule {

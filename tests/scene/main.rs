@@ -1,5 +1,6 @@
 //! Scenes: the shipped ones, and what they turn into.
 
+mod constants;
 mod errors;
 mod expression;
 mod keys;

@@ -3,12 +3,11 @@
 use super::{
     DEEPEST, Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
-    MAX_LENGTH, Table, interval, truth,
+    MAX_LENGTH, Scope, Table, interval, truth,
 };
 use crate::suggestion::suggestion;
 use std::{
     f64::consts::{FRAC_PI_2, PI},
-    path::Path,
     sync::Arc,
 };
 
@@ -30,6 +29,8 @@ const NAMES: [(&str, Instruction); 15] = [
     ("atan2", Binary(f64::atan2, interval::angle)),
     ("if", Choose),
 ];
+/// The functions given by points in a file: piecewise linear, and smooth.
+const TABLES: [&str; 2] = ["table", "spline"];
 /// Per operator: its text, its instruction, its precedence, and the smallest precedence of operators in its
 /// right operand: `a - b - c` groups from the left, `a^b^c` from the right. A longer operator stands before
 /// the shorter one with which it begins.
@@ -51,11 +52,22 @@ const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
 /// The precedence of a sign. Only `^` has a higher one: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;
 
+/// Why a constant cannot have this name, if it cannot.
+pub(in crate::scene) fn refused_name(name: &str) -> Option<&'static str> {
+    let is_letter = |c: char| c.is_alphabetic() || c == '_';
+    let mut known = NAMES.iter().map(|(name, _)| *name).chain(TABLES);
+    let is_operator = OPERATORS.iter().any(|(symbol, ..)| *symbol == name);
+    if is_operator || known.any(|known| known == name) {
+        return Some("has a name that expressions use for something else; choose another one");
+    }
+    (!name.starts_with(is_letter) || !name.chars().all(|c| is_letter(c) || c.is_numeric()))
+        .then_some("is no name for expressions; write letters, digits and _, a letter first")
+}
+
 /// Reads a text by precedence climbing.
 pub(super) struct Parser<'a> {
     text: &'a str,
-    /// The folder to which paths of tables are relative.
-    folder: &'a Path,
+    scope: &'a Scope,
     /// The byte offset of the next character.
     at: usize,
     depth: usize,
@@ -67,14 +79,14 @@ type Parsed = Result<(), String>;
 
 impl<'a> Parser<'a> {
     /// The program of `text`.
-    pub(super) fn parse(text: &'a str, folder: &'a Path) -> Result<Vec<Instruction>, String> {
+    pub(super) fn parse(text: &'a str, scope: &'a Scope) -> Result<Vec<Instruction>, String> {
         if text.len() > MAX_LENGTH {
             let length = text.len();
             return Err(format!(
                 "is {length} bytes long, and {MAX_LENGTH} are allowed; shorten it, or use table(\"file.csv\")"
             ));
         }
-        let mut parser = Self { text, folder, at: 0, depth: 0, program: Vec::new() };
+        let mut parser = Self { text, scope, at: 0, depth: 0, program: Vec::new() };
         parser.whole()?;
         Ok(parser.program)
     }
@@ -150,15 +162,23 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Parses a variable, π, or a function with its arguments.
+    /// Parses a variable, π, a constant, or a function with its arguments.
     fn name(&mut self, name: &str) -> Parsed {
         self.at += name.len();
-        if name == "table" {
-            return self.table();
+        if TABLES.contains(&name) {
+            return self.table(name);
         }
-        let Some((_, instruction)) = NAMES.iter().find(|(known, _)| *known == name) else {
+        let known = NAMES.iter().find(|(known, _)| *known == name).map(|(_, known)| known.clone());
+        let constant = self.scope.constants.get(name).map(|value| value.as_float().map(Number));
+        let Some(instruction) = known.or(constant.flatten()) else {
+            if self.scope.constants.contains_key(name) {
+                return Err(format!(
+                    "has the constant `{name}` without a value: it is wrong, or needs itself by way of others"
+                ));
+            }
             let kind = if self.peek() == Some('(') { "function" } else { "variable" };
-            let known = NAMES.iter().map(|(name, _)| *name).chain(["table"]);
+            let known = NAMES.iter().map(|(name, _)| *name).chain(TABLES);
+            let known = known.chain(self.scope.constants.keys().map(String::as_str));
             let suggestion = suggestion(name, &known.collect::<Vec<_>>());
             return Err(format!("has the unknown {kind} `{name}`{suggestion}"));
         };
@@ -174,20 +194,22 @@ impl<'a> Parser<'a> {
             let given = format!("calls `{name}` with {given} arguments");
             return Err(format!("{given}; it takes {takes}, in brackets"));
         }
-        self.push(instruction.clone());
+        self.push(instruction);
         Ok(())
     }
 
-    /// Parses the rest of a table: `("file")` or `("file", argument)`.
-    fn table(&mut self) -> Parsed {
-        let usage = "has a table without a file; write table(\"file.csv\"), of t, or \
-                     table(\"file.csv\", x)";
+    /// Parses the rest of a `table` or `spline`: `("file")` or `("file", argument)`.
+    fn table(&mut self, name: &str) -> Parsed {
+        let usage = format!(
+            "has a {name} without a file; write {name}(\"file.csv\"), of t, or {name}(\"file.csv\", x)"
+        );
         let quote = if self.take("(") { self.peek() } else { None };
         let rest = self.text[self.at..].strip_prefix(['"', '\'']);
         let file = quote.zip(rest).and_then(|(quote, rest)| rest.split_once(quote));
-        let Some((file, _)) = file else { return Err(usage.into()) };
+        let Some((file, _)) = file else { return Err(usage) };
         self.at += file.len() + 2;
-        let table = Table::read(&self.folder.join(file)).map_err(|error| format!("has {error}"))?;
+        let table = Table::read(&self.scope.folder.join(file), name == TABLES[1]);
+        let table = table.map_err(|error| format!("has {error}"))?;
         match self.take(",") {
             true => self.expression(1)?,
             false => self.program.push(Variable(2)),
