@@ -65,14 +65,13 @@ impl SceneText {
         let root = DeTable::parse_recoverable(file).0.into_inner();
         let constants = root.get("constants").map(Spanned::get_ref);
         let toml = |set: &String| {
-            let (key, value) = set.split_once('=').unwrap_or((set, ""));
-            let is_constant = constants.is_some_and(|all| all.get(key.trim()).is_some());
-            let of = if is_constant && !is_key(key.trim()) { "constants." } else { "" };
+            let Some((key, value)) = set.split_once('=') else { return set.clone() };
+            let name = key.trim();
+            let is_constant = !is_key(name) && constants.is_some_and(|all| all.get(name).is_some());
+            let of = if is_constant { "constants." } else { "" };
             match DeTable::parse(set) {
-                Err(_) if set.contains('=') => {
-                    format!("{of}{key}={}", toml::Value::from(value.trim()))
-                }
-                _ => format!("{of}{set}"),
+                Ok(_) => format!("{of}{set}"),
+                Err(_) => format!("{of}{key}={}", toml::Value::from(value.trim())),
             }
         };
         let indented = |(i, set)| " ".repeat((i + 1) * stride) + &toml(set);

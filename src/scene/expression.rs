@@ -15,7 +15,7 @@ use std::{
 use table::Table;
 use toml::Value;
 
-pub(super) use parser::refused_name;
+pub(super) use parser::{WITHOUT_VALUE, refused_name};
 
 /// The problem of an expression in the place of a number.
 pub(super) const NOT_CONSTANT: &str = "must be a constant, without x, y and t";
@@ -63,7 +63,7 @@ pub struct Expression {
 pub(super) struct Scope {
     /// The folder to which paths of tables are relative.
     pub(super) folder: PathBuf,
-    /// The constants by name. One that is not a float has no value.
+    /// The constants by name. One that is not a finite float has no value.
     pub(super) constants: toml::Table,
 }
 

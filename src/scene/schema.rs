@@ -2,7 +2,7 @@
 //! constants in its place, is read. The problems are collected, so that one message lists all problems of a scene.
 
 use super::document::{NOWHERE, Problem, SceneText, below, name_of, with_decimal_comma};
-use super::expression::{Expression, NOT_CONSTANT, Scope, refused_name};
+use super::expression::{Expression, NOT_CONSTANT, Scope, WITHOUT_VALUE, refused_name};
 use crate::suggestion::suggestion;
 use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
 use serde_json::Value as Schema;
@@ -40,9 +40,11 @@ pub(super) fn keys_of_element(table: &str) -> impl Iterator<Item = &'static str>
 
 /// The end of a message about an unknown key: the most similar key, the key with this name `also` in use, or the table
 /// of parameters in which a number may stand.
-fn known_as(schema: &Schema, name: &str, value: &DeValue) -> String {
+fn known_as(schema: &Schema, name: &str, value: &DeValue, constants: &toml::Table) -> String {
     let keys = || schema["properties"].as_object().into_iter().flatten();
-    let similar = suggestion(name, &keys().map(|(key, _)| key).collect::<Vec<_>>());
+    // The names of constants are known at the top of a scene.
+    let names = constants.keys().filter(|_| std::ptr::eq(schema, &*ROOT));
+    let similar = suggestion(name, &keys().map(|(key, _)| key).chain(names).collect::<Vec<_>>());
     let is_also =
         |of: &Schema| of["also"].as_array().is_some_and(|also| also.contains(&name.into()));
     let is_number = matches!(value, DeValue::Integer(_) | DeValue::Float(_));
@@ -80,6 +82,9 @@ impl<'t> Diagnostics<'t> {
         let document = Value::Boolean(false);
         let mut found = Self { text, scope, document, problems, places, unsound };
         found.document = found.read(String::new(), root, &ROOT);
+        // What only follows from a wrong constant is left out.
+        let follows = |problem: &str| problem.contains(WITHOUT_VALUE);
+        found.problems.retain(|(_, of)| of.starts_with("constants.") || !follows(of));
         found
     }
 
@@ -145,7 +150,7 @@ impl<'t> Diagnostics<'t> {
                     continue;
                 }
                 None if !is_named => {
-                    let suggestion = known_as(schema, name, value);
+                    let suggestion = known_as(schema, name, value, &self.scope.constants);
                     is_misspelt |= suggestion.contains("did you mean");
                     self.problems.push((place, format!("unknown key {key}{suggestion}")));
                     continue;

@@ -10,6 +10,7 @@ use std::{
     f64::consts::{FRAC_PI_2, PI},
     sync::Arc,
 };
+use toml::Value;
 
 /// All names with their instructions.
 const NAMES: [(&str, Instruction); 15] = [
@@ -29,6 +30,9 @@ const NAMES: [(&str, Instruction); 15] = [
     ("atan2", Binary(f64::atan2, interval::angle)),
     ("if", Choose),
 ];
+/// The end of a message about a constant that cannot be evaluated.
+pub(in crate::scene) const WITHOUT_VALUE: &str =
+    "without a value: it is wrong, or needs itself by way of others";
 /// The functions given by points in a file: piecewise linear, and smooth.
 const TABLES: [&str; 2] = ["table", "spline"];
 /// Per operator: its text, its instruction, its precedence, and the smallest precedence of operators in its
@@ -169,12 +173,11 @@ impl<'a> Parser<'a> {
             return self.table(name);
         }
         let known = NAMES.iter().find(|(known, _)| *known == name).map(|(_, known)| known.clone());
-        let constant = self.scope.constants.get(name).map(|value| value.as_float().map(Number));
-        let Some(instruction) = known.or(constant.flatten()) else {
+        let constant = self.scope.constants.get(name).and_then(Value::as_float);
+        let constant = constant.filter(|value| value.is_finite()).map(Number);
+        let Some(instruction) = known.or(constant) else {
             if self.scope.constants.contains_key(name) {
-                return Err(format!(
-                    "has the constant `{name}` without a value: it is wrong, or needs itself by way of others"
-                ));
+                return Err(format!("has the constant `{name}` {WITHOUT_VALUE}"));
             }
             let kind = if self.peek() == Some('(') { "function" } else { "variable" };
             let known = NAMES.iter().map(|(name, _)| *name).chain(TABLES);
