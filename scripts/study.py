@@ -5,12 +5,13 @@ table.
     signorini study geo/lshape.toml --set material.young=1e5,2e5,4e5 --set mesh.size=0.5,0.25
     signorini study geo/lshape.toml --cases cases.csv
 
-Each row of cases.csv is a run; the columns are keys or names of constants, and an empty cell leaves a key as it is. Each run
-has a folder below OUT, named by its values, or by the column `label`; OUT/study.csv is the table. A study that was interrupted goes on: runs that are complete
-are not repeated, unless the scene or its files have changed. Studies with the same OUT, also on several machines,
-divide the runs: each waits at its end for those that another has started. Runs write no frames (output.every = 0),
-unless --frames or a --set asks for them; those of one run are made by `signorini run OUT/NAME/scene.toml --set
-output.every=1`. A list is split at commas outside brackets and quotes. What follows `--` are other arguments of `run`.
+Each row of cases.csv is a run; the columns are keys or names of constants, and an empty cell leaves a key as it is.
+Each run has a folder below OUT, named by its values, or by the column `label`; OUT/study.csv is the table. A study
+that was interrupted goes on: runs that are complete are not repeated, unless the scene or its files have changed.
+Studies with the same OUT, also on several machines, divide the runs: each waits at its end for those that another has
+started. Runs write no frames (output.every = 0), unless --frames or a --set asks for them; those of one run are made
+by `signorini run OUT/NAME/scene.toml --set output.every=1`. A list is split at commas outside brackets and quotes.
+What follows `--` are other arguments of `run`.
 """
 
 import argparse
