@@ -8,7 +8,8 @@ FEniCSx gets the mesh. For a run below three seconds it is the median of three r
 relative errors of u (energy norm) and of the damage (L²) at the end, against the reference of references.py.
 FEniCSx solves the same discrete problem: it has our error, if the work of its loads agrees to 1e-6.
 
-Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene. Prints the Pareto front
+Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene (beside scenes that are not of this
+repository). Prints the Pareto front
 of each scene (the runs to which no other is both faster and more accurate) and how many times the seconds of
 `--accuracy` uniform meshes and steps take for some errors.
 
@@ -30,7 +31,7 @@ from statistics import median
 import numpy as np
 
 import references
-from shared import ROOT, parser_of
+from shared import ROOT, out_of, parser_of
 from converge import finish
 from drawing import BLUE, GREEN, INK, RED, plt
 from results import write_table
@@ -138,7 +139,7 @@ class Study:
         self.shipped = read_scene(path)
         file, _ = references.geometry_of(path, self.shipped)
         shutil.copy(file, folder)
-        self.reference = Run(references.graded(self.binary, path, ROOT / "out" / "reference" / "graded" / self.name))
+        self.reference = Run(references.graded(self.binary, path, out_of(path) / "reference" / "graded" / self.name))
         if self.reference.summary["stopped_by"]:
             raise SceneError(f"{path}: the run stops before its end, where errors are taken; choose a smaller time.end")
 
@@ -272,7 +273,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help="a third of the runs, each once")
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     arguments = parser.parse_args()
-    tables, out, failed = {}, ROOT / "out" / "chart", False
+    tables, out, failed = {}, out_of(arguments.scenes[0]) / "chart", False
     for path in arguments.scenes:
         with tempfile.TemporaryDirectory() as folder:
             try:
@@ -286,8 +287,9 @@ def main():
                 study.run(choice)
             tables[study.name], made = study.rows, study.last.summary["provenance"]
         if not arguments.asked:
-            (out / study.name).mkdir(parents=True, exist_ok=True)
-            write_table(study.rows, out / study.name / "chart.csv")
+            table = out_of(path) / "chart" / study.name / "chart.csv"
+            table.parent.mkdir(parents=True, exist_ok=True)
+            write_table(study.rows, table)
     if arguments.asked:
         print("true error over the accuracy")
         for name, rows in tables.items():

@@ -4,7 +4,7 @@
     converge.py [--binary FILE] [--reference] SCENE
 
 The coarsest mesh (8 times as coarse as the scene's) is refined by the midpoints of all sides. The reference is P1
-by `bdf2` on the last refinement, kept in out/reference/nested/; --reference makes it alone. The runs are P1 by
+by `bdf2` on the last refinement, kept in out/reference/nested/ (beside a scene that is not of this repository); --reference makes it alone. The runs are P1 by
 Euler's scheme on the coarsest mesh and up to four refinements, k = T/50 … T/1000. All are compared at 51
 times. On nested meshes of a polygon the norms of differences are exact. Along curved sides the new nodes are on the
 curve; there the coarse fields are continued to the fine mesh. Prints the errors, and writes converge.csv, run by run,
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shared import ROOT, parser_of
+from shared import ROOT, out_of, parser_of
 from drawing import FAINT, INK, MaxNLocator, plt
 from reading import read_frame
 from references import geometry_of, kept, nested
@@ -48,6 +48,8 @@ MEASURES = {
     "nodal": "|Δu| in H¹ at the nodes + ‖Δζ‖ in L²",
 }
 NORMS = list(MEASURES)[:4]
+SENTENCES = ("order {:.2f} in h + k over all runs", "{:.2f} in h at the smallest k",
+             "on the finest mesh it grows with k by {:.1e} per second")
 COLOURS = ["#2f6db3", "#d08a1d", "#3d8f5a", "#8e5aa8", "#c0392b"]
 
 
@@ -105,7 +107,8 @@ class Study:
         self.geometry = "\n".join([*lines, file.read_text(encoding="utf-8")])
         self.scene = {key: scene[key] for key in scene if key not in ("accuracy", "discretisation")}
         words = "".join(f"-{name}{value:g}" for name, value in parameters.items())
-        self.folder = (ROOT / "out" / "reference" / "nested"
+        self.out = out_of(path)
+        self.folder = (self.out / "reference" / "nested"
                        / f"{self.name}{words}-refined{self.refinements}-k{self.step:g}")
 
     def timed(self, step, scheme):
@@ -191,8 +194,11 @@ def report(rows):
         print(text(rows, lambda row: f"{row[name]:.4g}", "h", lambda h: f"{h:.4g}"))
         orders = [fit(column(of, x), column(of, name))[0] for of, x in ((rows, "h_plus_k"), (least, "h"))]
         growth = np.polyfit(column(finest, "k"), column(finest, name), 1)[0] if len(finest) > 1 else np.nan
-        print(f"\norder {orders[0]:.2f} in h + k over all runs, {orders[1]:.2f} in h at the smallest k; "
-              f"on the finest mesh it grows with k by {growth:.1e} per second\n")
+        # Orders need two meshes, and a growth two steps.
+        orders = orders if np.isfinite(orders[1]) else []
+        told = [words.format(value) for words, value in zip(SENTENCES[-len(orders) - 1:], (*orders, growth))
+                if np.isfinite(value)]
+        print(f"\n{'; '.join(told) or 'no order: it needs at least two meshes or steps'}\n")
     for name in ("sum", "nodal") if of_paper else ():
         ratios = column(of_paper, name) / column(of_paper, "printed")
         orders = [fit(column(of_paper, "h_plus_k"), column(of_paper, of))[0] for of in (name, "printed")]
@@ -285,7 +291,7 @@ def main():
         if arguments.reference:
             print(study.reference())
             return
-        out = arguments.out or ROOT / "out" / "converge" / study.name
+        out = arguments.out or study.out / "converge" / study.name
         out.mkdir(parents=True, exist_ok=True)
         print(f"{study.name}: linear triangles (P1), Euler's scheme", flush=True)
         rows = []

@@ -9,6 +9,12 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "scripts"))
 
 
+def out_of(scene):
+    """The folder of the results about a scene: out/ of this repository for its own scenes, and out/ beside another one."""
+    folder = Path(scene).resolve().parent
+    return (ROOT if ROOT in (folder, *folder.parents) else folder) / "out"
+
+
 def parser_of(doc, out=None):
     """A parser of a command line with --binary, and with --out below out/ if it has a default."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
