@@ -81,6 +81,7 @@ pub use nalgebra;
 pub mod interrupt;
 pub mod memory;
 pub mod phases;
+pub mod python;
 mod suggestion;
 mod whole_file;
 pub mod petsc;

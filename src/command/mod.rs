@@ -35,7 +35,7 @@ use signorini::{
     contact::{self, REGISTRY, SOLVERS, TAO_TYPES},
     estimate,
     interrupt::{Signal, received},
-    mesh::{self, Mesh},
+    mesh::{self, Format, Mesh},
     output::terminal::say,
     problem::{Figure, Figures},
     scene::{MeshSource, SCHEMA, Scene, Units},
@@ -125,7 +125,7 @@ fn split_names(list: &str) -> Vec<String> {
 pub struct SceneArguments {
     /// Scene file (TOML).
     scene: PathBuf,
-    /// Use this .geo or .msh instead of the scene's.
+    /// Use this mesh or geometry instead of the scene's.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Choose order, mesh and time steps so that every figure is within this part of its largest value in
@@ -218,13 +218,14 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
         let problem = "No such file; mesh.file (relative to the scene) or --mesh names it";
         return Err(Failure::input(format!("{}: {problem}", file.display())));
     }
-    if let Some(accuracy) = scene.accuracy
-        && adapts
-        && file.extension().is_none_or(|kind| kind != "msh")
-    {
-        return estimate::first_mesh(scene, accuracy).map_err(Failure::input);
-    }
-    mesh::load(file, parameters, scene.order).map_err(Failure::input)
+    let is_adapted = adapts && Format::of(file) == Some(Format::Geometry);
+    let mesh = match scene.accuracy.filter(|_| is_adapted) {
+        Some(accuracy) => estimate::first_mesh(scene, accuracy),
+        None => mesh::load(file, parameters, scene.order),
+    };
+    let mut mesh = mesh.map_err(Failure::input)?;
+    scene.name_edges(&mut mesh).map_err(Failure::input)?;
+    Ok(mesh)
 }
 
 /// The reference of all keys of a scene. scripts/keys.py makes it from their schema.

@@ -83,7 +83,7 @@ impl<'a> Recorder<'a> {
         output::prepare(folder, &Vec::from_iter(copied.chain([mesh])))?;
         write_whole(&folder.join(output::SCENE), as_run.text.as_bytes())?;
         for (name, file) in &as_run.copies {
-            output::copy(file, &folder.join(name))?;
+            output::copy(file, &folder.join(name), &as_run.copies)?;
         }
         if let Some(mesh) = adapted {
             let text = mesh.mesh.to_msh() + output::ADAPTED;

@@ -2,6 +2,7 @@
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
+use signorini::python::python;
 use std::{
     collections::BTreeMap, env, ffi::OsString, io::Seek, os::unix::process::CommandExt,
     process::Command,
@@ -24,11 +25,6 @@ const SCRIPTS: [(&str, &str); 25] = scripts! {
 const REPORT: (&str, &str) = ("report.html", include_str!("../../scripts/report.html"));
 /// The Python program that runs one of them.
 const EMBEDDED: &str = include_str!("../../scripts/embedded.py");
-/// The Python program that prints the missing packages.
-const PROBE: &str = "import sys, importlib.util as util\n\
-    lacks = [m for m in ('matplotlib', 'meshio', 'tomllib') if not util.find_spec(m)]\n\
-    sys.exit(', '.join(lacks) or None)";
-
 /// Arguments of a script.
 #[derive(Args)]
 #[command(disable_help_flag = true)]
@@ -41,7 +37,7 @@ pub struct ScriptArguments {
 /// Runs the script `name`, and returns only if it cannot start. The script itself reports problems of its input.
 pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Result<(), Failure> {
     require_one_process()?;
-    let python = python()?;
+    let python = python(&["matplotlib", "meshio", "tomllib"]).map_err(Failure::input)?;
     let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
     let sources = (|| {
         let mut file = tempfile::tempfile()?;
@@ -63,24 +59,4 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
         .stdin(sources)
         .exec();
     Err(Failure::from(format!("{}: {error}", python.display())))
-}
-
-/// The Python of the variable `PYTHON`; without it, the first usual one that has the packages of the scripts.
-fn python() -> Result<OsString, Failure> {
-    let usual = || vec!["/usr/bin/python3".into(), "python3".into()];
-    let candidates = env::var_os("PYTHON").map_or_else(usual, |python| vec![python]);
-    let mut problems = Vec::new();
-    for python in candidates {
-        let problem = match Command::new(&python).args(["-c", PROBE]).output() {
-            Ok(probe) if probe.status.success() => return Ok(python),
-            Ok(probe) => format!("lacks {}", String::from_utf8_lossy(&probe.stderr).trim()),
-            Err(error) => error.to_string(),
-        };
-        problems.push(format!("{} {problem}", python.display()));
-    }
-    Err(Failure::input(format!(
-        "this is done by Python 3.11 or newer with matplotlib and meshio (Debian: apt install \
-         python3-matplotlib python3-meshio; or PYTHON=… for another one), but {}",
-        problems.join("; ")
-    )))
 }

@@ -11,7 +11,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 mod boundary;
+mod convert;
 mod error;
+mod format;
 mod gmsh;
 mod lines;
 mod msh;
@@ -22,7 +24,8 @@ mod refine;
 
 pub use boundary::{BoundaryFace, BoundaryNode, SAME_DIRECTION, boundary_nodes, joined_faces};
 pub use error::MeshError;
-pub use gmsh::{is_self_contained, load, load_graded, scaling_factor};
+pub use format::{FORMATS, Format};
+pub use gmsh::{copies, load, load_graded, renamed, scaling_factor};
 pub(crate) use lines::CHORDS;
 pub use lines::Lines;
 pub use msh::{parse, read};

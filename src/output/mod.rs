@@ -17,6 +17,7 @@ mod vtu;
 pub use vtu::{FieldWriter, FieldsWritten};
 
 use crate::{
+    mesh,
     scene::{AsRun, Scene, Stepping},
     whole_file::{self, PARTIAL},
 };
@@ -168,15 +169,15 @@ pub fn prepare(folder: &Path, in_use: &[&Path]) -> Result<(), OutputError> {
     })
 }
 
-/// Copies a file into the results, if it is not there already.
+/// Copies a file into the results, if it is not there already. It names the files that it reads as their `copies`.
 ///
 /// # Errors
 /// It cannot be read or written.
-pub fn copy(from: &Path, to: &Path) -> Result<(), OutputError> {
+pub fn copy(from: &Path, to: &Path, copies: &[(String, PathBuf)]) -> Result<(), OutputError> {
     if is_same_file(from, to) {
         return Ok(());
     }
-    let content = fs::read(from).map_err(|error| OutputError::new(to, error))?;
+    let content = mesh::renamed(from, copies).map_err(|error| OutputError::new(to, error))?;
     write_whole(to, &content)
 }
 

@@ -1,7 +1,7 @@
 //! The scene file in a folder of results, which runs again from any folder.
 
 use super::{Scene, document::absolute};
-use crate::mesh;
+use crate::mesh::{self, Format};
 use std::{fs, path::PathBuf};
 
 /// The first line of the file.
@@ -26,15 +26,16 @@ impl AsRun {
 
     /// Whether a file has the name of a copy.
     pub fn is_copy(name: &str) -> bool {
-        let number = name.strip_prefix("scene-table").and_then(|rest| rest.strip_suffix(".csv"));
-        ["scene.geo", "scene.msh"].contains(&name)
-            || number.is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()))
+        let stem = name.split('.').next().unwrap_or_default();
+        let number = ["scene-table", "scene-mesh"].iter().find_map(|kind| stem.strip_prefix(kind));
+        number.is_some_and(|digits| digits.bytes().all(|byte| byte.is_ascii_digit()))
+            || (stem == "scene" && (Format::of(name.as_ref()).is_some()))
     }
 }
 
 impl Scene {
     /// The scene file that repeats the run. Copies of tables and of the mesh or its geometry stand beside it. A
-    /// geometry that reads other files keeps its full path; so does a mesh file if the run writes no frames.
+    /// geometry whose files are not known keeps its full path; so does a mesh file if the run writes no frames.
     pub fn as_run(&self) -> AsRun {
         let mut scene = self.text.document.clone();
         let (mut copies, mut tables) = (Vec::new(), Vec::new());
@@ -53,14 +54,12 @@ impl Scene {
         scene.iter_mut().for_each(|(_, value)| map_tables(value, &mut name));
         scene.insert("title".into(), self.title.clone().into());
         let source = &self.mesh.file;
-        let has = |ending: &str| source.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
-        let copy = match () {
-            () if has("geo") => mesh::is_self_contained(source).then_some("scene.geo"),
-            () => (self.output.every != Some(0)).then_some("scene.msh"),
-        };
+        let is_copied =
+            self.output.every != Some(0) || Format::of(source) == Some(Format::Geometry);
+        let of_mesh = if is_copied { mesh::copies(source) } else { Vec::new() };
         let full = || absolute(source).to_string_lossy().into_owned();
-        let file = copy.map_or_else(full, str::to_owned);
-        copies.extend(copy.map(|name| (name.to_owned(), source.clone())));
+        let file = of_mesh.first().map_or_else(full, |(name, _)| name.clone());
+        copies.extend(of_mesh);
         // A mesh from the command line has no parameters.
         let written = scene.get("mesh").and_then(toml::Value::as_table).cloned();
         let mut mesh = written.filter(|_| !self.mesh.parameters.is_empty()).unwrap_or_default();

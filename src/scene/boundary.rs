@@ -5,11 +5,13 @@ use super::schema::{Diagnostic, is_wrong, keys_of_element};
 use serde::Deserialize;
 use std::array;
 
-/// A physical curve and the conditions on it.
+/// A part of the boundary and the conditions on it.
 #[derive(Debug, Clone)]
 pub struct Boundary {
     /// The physical curve.
     pub name: String,
+    /// Selects its edges, where the mesh has no such curve ([`Scene::name_edges`](super::Scene::name_edges)).
+    pub selection: Option<Expression>,
     /// At least one condition. The conditions do not contradict each other.
     pub conditions: Vec<Condition>,
 }
@@ -139,6 +141,7 @@ pub(super) fn contradiction(a: &[Condition], b: &[Condition]) -> Option<[String;
 #[serde(deny_unknown_fields)]
 pub(super) struct BoundaryKeys {
     name: String,
+    r#where: Option<Expression>,
     displacement: Option<[toml::Value; 2]>,
     symmetry: bool,
     gap: Option<Expression>,
@@ -148,7 +151,16 @@ pub(super) struct BoundaryKeys {
 }
 
 pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
-    let BoundaryKeys { name, displacement, symmetry, gap, normal, traction, pressure } = keys;
+    let BoundaryKeys {
+        name,
+        r#where: selection,
+        displacement,
+        symmetry,
+        gap,
+        normal,
+        traction,
+        pressure,
+    } = keys;
     let prescribed = |value: toml::Value| match value.as_str() {
         Some("free") => Ok(None),
         _ => value.try_into().map(Some).map_err(is_wrong),
@@ -160,6 +172,9 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
     if let Some([None, None]) = displacement {
         let problem = "is \"free\" in both components; leave it out".to_owned();
         return Err(("displacement", problem));
+    }
+    if selection.as_ref().is_some_and(Expression::depends_on_time) {
+        return Err(("where", "depends on t; it selects a part of the undeformed body".to_owned()));
     }
     if normal.is_some() && gap.is_none() {
         return Err(("normal", "needs a gap beside it".to_owned()));
@@ -181,11 +196,12 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
         return Err(("", problem));
     }
     if conditions.is_empty() {
-        let choices = keys_of_element("boundary").filter(|key| !["name", "normal"].contains(key));
+        let choices =
+            keys_of_element("boundary").filter(|key| !["name", "where", "normal"].contains(key));
         let choices = choices.collect::<Vec<_>>().join(", ");
         return Err(("", format!("has nothing in it: give it one of {choices}, or remove it")));
     }
-    Ok(Boundary { name, conditions })
+    Ok(Boundary { name, selection, conditions })
 }
 
 /// A constant direction, scaled to length 1.

@@ -219,7 +219,7 @@ impl Scene {
     /// expression that does not depend on space or time is evaluated at one point or time only. If there are
     /// too many points and times, all points are used at the first and the last time, and at the times
     /// between them the points take turns.
-    fn check(
+    pub(super) fn check(
         &self,
         key: &str,
         expression: &Expression,
@@ -248,7 +248,7 @@ impl Scene {
         None
     }
 
-    fn at_key(&self, key: &str, problem: &str) -> Problem {
+    pub(super) fn at_key(&self, key: &str, problem: &str) -> Problem {
         (self.text.place(key), format!("{key} {problem}"))
     }
 
@@ -260,7 +260,7 @@ impl Scene {
 }
 
 /// A key of a boundary, in full.
-fn boundary_key(name: &str, key: &str) -> String {
+pub(super) fn boundary_key(name: &str, key: &str) -> String {
     format!("boundary.{name}.{key}")
 }
 
@@ -271,8 +271,8 @@ fn no_curves(mesh: &Mesh, name: &str) -> String {
     let corners =
         corners.map(|&node| format!("({}, {})", mesh.nodes[node][0], mesh.nodes[node][1]));
     format!(
-        ", which has none: name each in the .geo, as in Physical Curve(\"{name}\") = {{1}}; the boundary has \
-         corners at {}",
+        ", which has none: name each in the .geo, as in Physical Curve(\"{name}\") = {{1}}, or select edges here, as in \
+         where = \"y < 1e-6\"; the boundary has corners at {}",
         corners.collect::<Vec<_>>().join(", ")
     )
 }

@@ -14,6 +14,7 @@ mod document;
 mod error;
 mod expression;
 mod schema;
+mod selection;
 mod tables;
 mod time;
 mod units;
@@ -33,7 +34,7 @@ pub use units::Units;
 use crate::{
     contact::ContactOptions,
     fem::Mass,
-    mesh::{Mesh, Order},
+    mesh::{Format, Mesh, Order},
     model::{DamageLaw, Material},
     whole_file,
 };
@@ -88,12 +89,12 @@ pub struct Scene {
     text: SceneText,
 }
 
-/// A mesh file and, for a `.geo`, its parameters.
+/// A mesh file and, for a geometry, its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeshSource {
-    /// A `.geo` or `.msh` file.
+    /// A file in one of the formats of [`Format`].
     pub file: PathBuf,
-    /// Constants set in the `.geo`, by name; `size` is the mesh size, m.
+    /// Constants set in the geometry, by name; `size` is the mesh size, m.
     pub parameters: BTreeMap<String, f64>,
 }
 
@@ -211,7 +212,7 @@ impl Scene {
     /// `--set`), the key and what to write instead.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let refused = |problem| SceneError(vec![format!("{}: {problem}", path.display())]);
-        if path.extension().is_some_and(|ending| ending == "geo" || ending == "msh") {
+        if Format::of(path).is_some() {
             let problem = "it is a mesh, and what runs is a scene that names it in [mesh] (`signorini \
                            new NAME` writes one)";
             return Err(refused(problem.to_owned()));

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     contact::{self, ContactOptions},
     fem::Mass,
-    mesh::Order,
+    mesh::{FORMATS, Format, Order},
     model::{DamageLaw, Material},
 };
 use serde::{Deserialize, de::DeserializeOwned};
@@ -138,15 +138,14 @@ fn mesh(
     MeshKeys { file, size, parameters }: MeshKeys,
     folder: &Path,
 ) -> Result<MeshSource, Diagnostic> {
-    let extension = Path::new(&file).extension();
-    if !extension.is_some_and(|extension| extension == "geo" || extension == "msh") {
-        return Err(("file", "must be a .geo or .msh file".to_owned()));
-    }
-    if file.ends_with(".msh") && (size.is_some() || parameters.is_some()) {
+    let Some(format) = Format::of(Path::new(&file)) else {
+        return Err(("file", format!("must be {FORMATS}")));
+    };
+    if format != Format::Geometry && (size.is_some() || parameters.is_some()) {
         let useless = if size.is_some() { "size" } else { "parameters" };
         return Err((
             useless,
-            format!("has no effect: \"{file}\" is used as it is; name its .geo"),
+            format!("has no effect: \"{file}\" is used as it is; name its geometry"),
         ));
     }
     let mut parameters = parameters.unwrap_or_default();

@@ -72,7 +72,7 @@ fn arguments() {
         (&["--solver", "simplex"][..], &["--solver: ", "`simplex`", "active-set", "tao"][..]),
         (&["--set", "time.stp=1"], &["--set time.stp=1: unknown key time.stp", "`step`"]),
         (&["--mesh", "none.msh"], &["none.msh: No such file"]),
-        (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh file or a .geo file"]),
+        (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh, a geometry for gmsh"]),
         (&["--mesh", "square.geo", "--set", "mesh.size=1"], &["--set mesh.size=1 has no effect"]),
         (
             &["--set", "time.end=1", "--set", "time.end = 2"],

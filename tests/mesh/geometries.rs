@@ -309,7 +309,11 @@ fn what_gmsh_rejects_is_told() {
     let none = load(&folder.path().join("none.geo"), &BTreeMap::new(), Order::Linear).unwrap_err();
     assert!(matches!(none, MeshError::Io { .. }));
     let other = load(Path::new("body.stl"), &BTreeMap::new(), Order::Linear).unwrap_err();
-    assert_eq!(other.to_string(), "body.stl: a mesh is a .msh file or a .geo file for gmsh");
+    assert_eq!(
+        other.to_string(),
+        "body.stl: a mesh is a .msh, a geometry for gmsh (.geo .step .stp .brep .iges .igs), or a mesh of another program \
+         (.inp .unv .med .bdf .nas .vtu .vtk .xdmf)"
+    );
 }
 
 #[test]

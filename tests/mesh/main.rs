@@ -19,6 +19,7 @@ fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
 
 mod blemishes;
 mod boundary;
+mod foreign;
 mod geometries;
 mod malformed;
 mod numbering;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use signorini::mesh::{Curve, Mesh};
+use signorini::mesh::{Curve, Mesh, Refinement};
 use signorini::scene::{Scene, SceneError};
 
 use crate::BASE;
@@ -168,4 +168,81 @@ fn all_that_is_wrong_is_told_at_once() {
     assert!(places[0].starts_with("bad.toml:17: damage.initial is 0"), "{message}");
     assert!(places[1].starts_with("error: bad.toml:36: boundary.foundation.gap is inf"));
     assert!(places[2].starts_with("error: bad.toml:40: boundary \"axes\" is no physical"));
+}
+
+/// Parses the base scene with `keys` in place of the axis, names the edges of `mesh`, and checks it.
+fn named(keys: &str, sets: &[&str], mesh: &mut Mesh) -> Result<(), String> {
+    let text = BASE.replacen("name = \"axis\"", keys, 1);
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    let scene = Scene::parse(&text, Path::new("bad.toml"), &sets).unwrap_or_else(|e| panic!("{e}"));
+    scene.name_edges(mesh).and_then(|()| scene.check_mesh(mesh)).map_err(|e| first_line(&e))
+}
+
+#[test]
+fn a_boundary_is_selected_by_the_midpoints_of_its_edges() {
+    // The left side of the square, by expressions that are true there alone.
+    for selection in [
+        "x < 1e-6",
+        "x == 0",
+        "1 - min(1, 1e6*x)",
+        "x < 0.001 and y > 0.999",
+        "0.5 > x + abs(y - 1)",
+    ] {
+        let (mut mesh, selected) = (square(), format!("name = \"axis\"\nwhere = \"{selection}\""));
+        mesh.curves.remove("axis");
+        let notes = if selection.contains('y') { 1 } else { 0 };
+        assert_eq!(named(&selected, &[], &mut mesh), Ok(()), "{selection}");
+        assert_eq!(mesh.edges_of("axis"), square().edges_of("axis"), "{selection}");
+        // An end within an edge is noted, and refused where an accuracy is asked for.
+        assert_eq!(mesh.notes.len(), notes, "{:?}", mesh.notes);
+        let accurate = named(&selected, &["accuracy=0.1"], &mut mesh);
+        let is_refused =
+            accurate.is_err_and(|e| e.contains("boundary.axis.where changes within the edge"));
+        assert_eq!(is_refused, notes > 0, "{selection}");
+    }
+    let refused = |selection: &str, mesh: &mut Mesh, told: &str| {
+        let message = named(&format!("name = \"axis\"\nwhere = \"{selection}\""), &[], mesh)
+            .expect_err(selection);
+        assert!(message.contains(told), "{message}");
+    };
+    let mut mesh = square();
+    mesh.curves.remove("axis");
+    refused(
+        "x < 0",
+        &mut mesh.clone(),
+        "is true at no midpoint of the edges, which lie from (0.0000, 0.0000) to (2.0000, 2.0000)",
+    );
+    refused("1/x", &mut mesh.clone(), "boundary.axis.where is inf at (0, 1)");
+    refused("sqrt(y - 1) < 1", &mut mesh.clone(), "boundary.axis.where is NaN at (1, 0)");
+    refused(
+        "y < 1e-6",
+        &mut mesh,
+        "boundary \"axis\" has a symmetry, but boundary \"foundation\" on the same edge at (1, 0) has a gap",
+    );
+    refused(
+        "y > 1.9",
+        &mut square(),
+        "is true at other edges than those of the physical curve of this name",
+    );
+    assert_eq!(named("name = \"axis\"\nwhere = \"x < 1e-6\"", &[], &mut square()), Ok(()));
+}
+
+#[test]
+fn refined_meshes_keep_the_edges_that_were_selected() {
+    let mut mesh = square();
+    mesh.curves.remove("axis");
+    // The tolerance is larger than the edges of the last mesh.
+    named("name = \"axis\"\nwhere = \"x < 1e-2\"", &[], &mut mesh).expect("a selection");
+    let mut refinement = Refinement::start(mesh);
+    for _ in 0..20 {
+        // Towards the corner at node 0.
+        let marked: Vec<bool> = refinement.mesh.triangles.iter().map(|t| t.contains(&0)).collect();
+        refinement = refinement.refine(&marked).expect("straight edges");
+    }
+    let mesh = &refinement.mesh;
+    let edges = mesh.edges_of("axis");
+    assert!(edges.len() > 8, "{}", edges.len());
+    assert!(edges.iter().flatten().all(|&node| mesh.nodes[node][0] == 0.0));
+    let length: f64 = edges.iter().map(|&edge| mesh.edge_normal(edge).1).sum();
+    assert!((length - 2.0).abs() < 1e-12, "{length}");
 }

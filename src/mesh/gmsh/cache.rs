@@ -10,7 +10,6 @@ use std::{
     env,
     ffi::OsString,
     fs, io,
-    iter::once,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -18,12 +17,17 @@ use std::{
 /// Commands and options of a `.geo` that read the file of the name that follows in quotes. (An unquoted name
 /// is known to gmsh alone.)
 const READERS: [&str; 4] = ["Include", "Merge", "ShapeFromFile", "FileName"];
-/// Commands of a `.geo` whose result depends on more than files.
-const IMPURE: [&str; 2] = ["SystemCall", "GetEnv"];
+/// Commands of a `.geo` whose result depends on more than files, and the signs of an `.xdmf` and of an `.inp` that read files;
+/// in any case of their letters.
+const IMPURE: [&str; 4] = ["systemcall", "getenv", ".h5:", "input="];
+/// Signs between a reader and its name.
+const BEFORE_NAME: [char; 7] = [' ', '\t', '\r', '\n', '(', '=', '{'];
 
 /// The files from which gmsh makes a mesh.
 pub struct Inputs {
-    /// The contents of the `.geo` and of all files that it names, directly or through others.
+    /// The `.geo`, and all files that it names, directly or through others.
+    files: Vec<PathBuf>,
+    /// Their contents.
     pub contents: Vec<Vec<u8>>,
     /// Whether the mesh depends on these files alone.
     pub are_all: bool,
@@ -32,29 +36,37 @@ pub struct Inputs {
 impl Inputs {
     /// Reads a `.geo` and each file whose name stands there in quotes. gmsh reports missing files.
     pub fn read(geo: &Path) -> io::Result<Self> {
-        let mut files = vec![fs::canonicalize(geo)?];
-        let mut inputs = Self { contents: Vec::new(), are_all: true };
-        while let Some(file) = files.get(inputs.contents.len()).cloned() {
+        let files = vec![fs::canonicalize(geo)?];
+        let mut inputs = Self { files, contents: Vec::new(), are_all: true };
+        while let Some(file) = inputs.files.get(inputs.contents.len()).cloned() {
             let bytes = fs::read(&file)?;
             let text = String::from_utf8_lossy(&bytes);
             // gmsh also runs the options beside a file.
-            let options = format!("{}.opt", file.display());
-            for name in text.split('"').chain(once(&*options)) {
-                // Most names are relative to the file that contains them, those of size fields to the working folder.
-                for path in [file.with_file_name(name), PathBuf::from(name)] {
-                    let path = fs::canonicalize(path).ok();
-                    files.extend(path.filter(|path| path.is_file() && !files.contains(path)));
-                }
+            let options = fs::canonicalize(format!("{}.opt", file.display()));
+            for path in parts(&file, &text).flat_map(|(_, paths)| paths).chain(options) {
+                inputs.files.extend((!inputs.files.contains(&path)).then_some(path));
             }
-            let argument = |rest: &str| {
-                rest.trim_start_matches(|c: char| c.is_whitespace() || "(={".contains(c))
-                    .starts_with('"')
-            };
-            inputs.are_all &= !IMPURE.iter().any(|command| text.contains(command))
+            let argument = |rest: &str| rest.trim_start_matches(BEFORE_NAME).starts_with('"');
+            let lower: String = text.to_ascii_lowercase().replace(' ', "");
+            inputs.are_all &= !IMPURE.iter().any(|command| lower.contains(command))
                 && READERS.iter().all(|reader| text.split(reader).skip(1).all(argument));
             inputs.contents.push(bytes);
         }
         Ok(inputs)
+    }
+
+    /// Names for copies of these files in one folder; none if files are not known.
+    pub fn copies(self) -> Vec<(String, PathBuf)> {
+        let ending =
+            |file: &Path| file.extension().unwrap_or_default().to_string_lossy().into_owned();
+        if !self.are_all || self.files.iter().any(|file| ending(file) == "opt") {
+            return Vec::new();
+        }
+        let name = |(number, file): (usize, PathBuf)| match number {
+            0 => (format!("scene.{}", ending(&file)), file),
+            _ => (format!("scene-mesh{number}.{}", ending(&file)), file),
+        };
+        self.files.into_iter().enumerate().map(name).collect()
     }
 
     /// The digest of these files, of the options that the user has saved in gmsh, and of what else gmsh gets.
@@ -63,6 +75,33 @@ impl Inputs {
         let files: Vec<_> = self.contents.iter().chain(&options).map(|file| digest(file)).collect();
         digest(format!("{files:?} {arguments:?} {last:?}").as_bytes())
     }
+}
+
+/// The parts of the text of a `file` between quotes, and for each name of a file to read the paths of files with this name. Most
+/// names are relative to the file that contains them, those of size fields to the working folder.
+fn parts<'a>(file: &'a Path, text: &'a str) -> impl Iterator<Item = (&'a str, Vec<PathBuf>)> {
+    let mut before = "";
+    text.split('"').map(move |part| {
+        let is_name = READERS.iter().any(|reader| before.ends_with(reader));
+        before = part.trim_end_matches(BEFORE_NAME);
+        let paths = [file.with_file_name(part), PathBuf::from(part)].into_iter();
+        let paths = paths.filter(|_| is_name).flat_map(fs::canonicalize);
+        (part, paths.filter(|path| path.is_file()).collect())
+    })
+}
+
+/// The contents of a file in which the names of files that it reads are those of their `copies`.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn renamed(file: &Path, copies: &[(String, PathBuf)]) -> io::Result<Vec<u8>> {
+    let bytes = fs::read(file)?;
+    let Ok(text) = str::from_utf8(&bytes) else { return Ok(bytes) };
+    let new = |(part, paths): (&str, Vec<PathBuf>)| {
+        let copy = copies.iter().find(|(_, of)| paths.first() == Some(of));
+        copy.map_or(part, |(name, _)| name).to_owned()
+    };
+    Ok(Vec::from_iter(parts(file, text).map(new)).join("\"").into_bytes())
 }
 
 fn digest(bytes: &[u8]) -> String {

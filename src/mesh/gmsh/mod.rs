@@ -3,23 +3,28 @@
 mod cache;
 mod process;
 
-use process::note;
-pub(super) use process::run;
+pub use cache::renamed;
+pub(super) use process::{note, run};
 
 use super::{
-    Mesh, MeshError, Order,
+    FORMATS, Format, Mesh, MeshError, Order, convert,
     msh::{parse, parse_made, read},
 };
 use crate::whole_file;
 use cache::Inputs;
-use std::{collections::BTreeMap, ffi::OsString, fs, io, path::Path};
+use std::{
+    collections::BTreeMap,
+    ffi::OsString,
+    fs, io,
+    path::{Path, PathBuf},
+};
 
-/// Reads a `.msh`, or meshes a `.geo` with gmsh unless this was done before, and sorts nodes and triangles
-/// ([`Mesh::in_morton_order`]). `parameters` and `order` apply to a `.geo` only.
+/// Reads a `.msh`, meshes a geometry with gmsh or converts the mesh of another program unless this was done before, and sorts
+/// nodes and triangles ([`Mesh::in_morton_order`]). `parameters` and `order` apply to a geometry only.
 ///
-/// The mesh of a `.geo` is kept beside it. Its name lists the parameters and order 2, as in
-/// `bridge-grading=3-size=0.25.msh` and `hertz.order2.msh`. It is read again if gmsh would make it from the same
-/// files, parameters and order, in the same version.
+/// The mesh is kept beside its file. Its name lists the parameters and order 2, as in `bridge-grading=3-size=0.25.msh`,
+/// `hertz.order2.msh` and, for other files than a `.geo`, `part.step-size=2.msh`. It is read again if gmsh would make it
+/// from the same files, parameters and order, in the same version.
 ///
 /// Each parameter overrides the `DefineConstant` of its name. `size`, in m, also bounds the length of the edges.
 ///
@@ -31,11 +36,10 @@ pub fn load(
     parameters: &BTreeMap<String, f64>,
     order: Order,
 ) -> Result<Mesh, MeshError> {
-    let extension = path.extension().map(|e| e.to_ascii_lowercase());
-    let mesh = match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("msh") => read(path),
-        Some("geo") => mesh_geo(path, parameters, order),
-        _ => Err(MeshError::file(path, "a mesh is a .msh file or a .geo file for gmsh")),
+    let mesh = match Format::of(path) {
+        Some(Format::Msh) => read(path),
+        Some(format) => kept(path, format, parameters, order),
+        None => Err(MeshError::file(path, format!("a mesh is {FORMATS}"))),
     };
     mesh.map(Mesh::in_morton_order)
 }
@@ -71,25 +75,29 @@ pub fn load_graded(
     parse_made(&bytes, geo).map(Mesh::in_morton_order)
 }
 
-/// The mesh of a `.geo` file, kept beside it.
-fn mesh_geo(
+/// The mesh of a geometry or of another program, kept beside its file.
+fn kept(
     geo: &Path,
+    format: Format,
     parameters: &BTreeMap<String, f64>,
     order: Order,
 ) -> Result<Mesh, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
-    if text.contains('\0') {
+    let is_script = geo.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("geo"));
+    if is_script && text.contains('\0') {
         return Err(MeshError::file(geo, "is in UTF-16 or no text; save the file in UTF-8"));
     }
     // gmsh 4.8 drops the others silently.
-    if !text.ends_with('\n')
+    if is_script
+        && !text.ends_with('\n')
         && text.lines().last().is_some_and(|last| last.matches(';').count() > 1)
     {
         let problem = "its last line does not end with a newline, so that gmsh reads only the first command \
                        there; add the newline";
         return Err(MeshError::file(geo, problem));
     }
-    let mut name = geo.file_stem().unwrap_or_default().to_owned();
+    let name = if is_script { geo.file_stem() } else { geo.file_name() };
+    let mut name = name.unwrap_or_default().to_owned();
     for (parameter, &value) in parameters {
         if let Some(reason) = refusal(&text, parameter, value) {
             let problem = format!("mesh parameter `{parameter}` = {value}: {reason}");
@@ -98,10 +106,15 @@ fn mesh_geo(
         name.push(format!("-{parameter}={value}"));
     }
     // No parameter makes such a name, as names of parameters have no point.
-    name.push(if order == Order::Quadratic { ".order2.msh" } else { ".msh" });
+    let is_quadratic = order == Order::Quadratic && format == Format::Geometry;
+    name.push(if is_quadratic { ".order2.msh" } else { ".msh" });
     let path = geo.with_file_name(name);
 
-    let (arguments, last) = (arguments(parameters), last_words(&text, parameters, order));
+    let arguments = arguments(parameters);
+    let last = match format {
+        Format::Geometry => last_words(&text, parameters, order),
+        _ => convert::SCRIPT.to_owned(),
+    };
     let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
     let digest = inputs.digest(&arguments, &last);
     let cached = fs::read(&path);
@@ -117,7 +130,10 @@ fn mesh_geo(
             return Ok(mesh);
         }
     }
-    let bytes = run((geo, None), arguments, &last, "mesh it")?;
+    let bytes = match format {
+        Format::Geometry => run((geo, None), arguments, &last, "mesh it")?,
+        _ => convert::run(geo)?,
+    };
     let mesh = parse_made(&bytes, geo)?;
     let is_free = fs::symlink_metadata(&path).is_err();
     if is_free || origin.is_some() {
@@ -174,9 +190,13 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     }
 }
 
-/// Whether a `.geo` reads no other file.
-pub fn is_self_contained(geo: &Path) -> bool {
-    Inputs::read(geo).is_ok_and(|inputs| inputs.contents.len() == 1 && inputs.are_all)
+/// The files that a mesh is made from, with names for copies in another folder. The first is `file` itself. There are none if
+/// they are not known.
+pub fn copies(file: &Path) -> Vec<(String, PathBuf)> {
+    match Format::of(file) {
+        Some(Format::Msh) => vec![("scene.msh".to_owned(), file.to_owned())],
+        _ => Inputs::read(file).map_or_else(|_| Vec::new(), Inputs::copies),
+    }
 }
 
 /// Whether the `.geo` file `text` sets the largest length of an edge from the parameter `size`.

@@ -1,0 +1,290 @@
+//! Meshes of other programs: their sets are the physical groups of the same mesh from gmsh.
+
+use crate::common::{check_laws, close, curve_length, curved_area, length, triangle_areas};
+use signorini::mesh::{Mesh, Order, distance, load, sorted};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Write,
+    fs,
+    path::Path,
+    process::Command,
+};
+
+/// A bracket of two parts with a hole in one of them: area 3 − 0.09 π.
+const BRACKET: &str = r#"
+SetFactory("OpenCASCADE");
+Rectangle(1) = {0, 0, 0, 2, 1}; Rectangle(2) = {0, 1, 0, 1, 1}; Disk(3) = {1.5, 0.5, 0, 0.3};
+BooleanDifference{ Surface{1}; Delete; }{ Surface{3}; Delete; }
+Coherence;
+e = 1e-6;
+Physical Surface("arm") = Surface In BoundingBox{-e, -e, -e, 2+e, 1+e, e};
+Physical Surface("wall") = Surface In BoundingBox{-e, 1-e, -e, 1+e, 2+e, e};
+Physical Curve("base") = Curve In BoundingBox{-e, -e, -e, 2+e, e, e};
+Physical Curve("top") = Curve In BoundingBox{-e, 2-e, -e, 1+e, 2+e, e};
+Physical Curve("hole") = Curve In BoundingBox{1.2-e, 0.2-e, -e, 1.8+e, 0.8+e, e};
+Mesh.MeshSizeMax = 0.3;
+"#;
+
+/// The mesh that gmsh makes of the bracket, and the same mesh in the format of another program.
+fn made(folder: &Path, order: Order, extension: &str) -> [Mesh; 2] {
+    let geo = folder.join("bracket.geo");
+    fs::write(&geo, BRACKET).unwrap();
+    let other = geo.with_extension(extension);
+    let quadratic = if order == Order::Quadratic { "2" } else { "1" };
+    let mut gmsh = Command::new("gmsh");
+    gmsh.args(["-2", "-nt", "1", "-v", "1", "-order", quadratic]).arg(&geo).arg("-o").arg(&other);
+    assert!(gmsh.status().unwrap().success());
+    [load(&geo, &BTreeMap::new(), order).unwrap(), load(&other, &BTreeMap::new(), order).unwrap()]
+}
+
+/// The mesh of an Abaqus file.
+fn abaqus(text: &str) -> Result<Mesh, String> {
+    read("part.inp", text)
+}
+
+fn read(name: &str, text: &str) -> Result<Mesh, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    load(&path, &BTreeMap::new(), Order::Linear).map_err(|error| error.to_string())
+}
+
+/// Per name: the length of its curve, the area of its surface.
+fn measures(mesh: &Mesh) -> [BTreeMap<&str, f64>; 2] {
+    let areas: Vec<f64> = triangle_areas(mesh).collect();
+    let curves = mesh.curves.iter().map(|(name, curve)| (&**name, length(mesh, &curve.edges)));
+    let of = |triangles: &[usize]| triangles.iter().map(|&t| areas[t]).sum();
+    let surfaces = mesh.surfaces.iter().map(|(name, triangles)| (&**name, of(triangles)));
+    [curves.collect(), surfaces.collect()]
+}
+
+#[track_caller]
+fn same(made: &Mesh, converted: &Mesh, digits: f64) {
+    for (a, b) in measures(made).iter().zip(measures(converted)) {
+        for (name, value) in a {
+            assert!((value - b[name]).abs() <= digits, "{name}: {value} is not {}", b[name]);
+        }
+    }
+    assert!(converted.curves.values().all(|curve| curve.other_edges == 0));
+    assert!((curved_area(made) - curved_area(converted)).abs() <= digits);
+}
+
+#[test]
+fn groups_of_gmsh_survive_the_formats_with_names() {
+    for order in [Order::Linear, Order::Quadratic] {
+        for extension in ["unv", "inp"] {
+            let folder = tempfile::tempdir().unwrap();
+            let [geo, other] = made(folder.path(), order, extension);
+            same(&geo, &other, 1e-9);
+            assert_eq!(other.curved.is_empty(), order == Order::Linear, "{extension}");
+        }
+    }
+}
+
+#[test]
+fn tags_name_the_groups_of_formats_without_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let [geo, bulk] = made(folder.path(), Order::Linear, "bdf");
+    assert_eq!(geo.triangles.len(), bulk.triangles.len());
+    // The numbers of the two surfaces of the geometry, and of its curves, in single precision.
+    let [curves, surfaces] = measures(&bulk);
+    assert_eq!(surfaces.len(), 2);
+    assert!(surfaces.values().any(|area| (area - 1.0).abs() < 1e-5), "{surfaces:?}");
+    assert!(curves.len() >= 3, "{curves:?}");
+
+    let vtu = |types: [u8; 3], tags: &str| {
+        let array = |name: &str, kind: &str, components: usize, of: &str| {
+            format!(
+                "<DataArray Name='{name}' type='{kind}' NumberOfComponents='{components}' format='ascii'>{of}</DataArray>"
+            )
+        };
+        let types = types.map(|t| t.to_string()).join(" ");
+        format!(
+            "<?xml version='1.0'?><VTKFile type='UnstructuredGrid' version='0.1' byte_order='LittleEndian'>\
+             <UnstructuredGrid><Piece NumberOfPoints='5' NumberOfCells='3'><Points>{}</Points><Cells>{}{}{}</Cells>\
+             <CellData>{}</CellData></Piece></UnstructuredGrid></VTKFile>",
+            array("Points", "Float64", 3, "0 0 0  2 0 0  2 1 0  0 1 0  1 2 0"),
+            array("connectivity", "Int64", 1, "0 1 2 3  3 2 4  0 1"),
+            array("offsets", "Int64", 1, "4 7 9"),
+            array("types", "UInt8", 1, &types),
+            array("part", "Int64", 1, tags)
+        )
+    };
+    let mesh = read("part.vtu", &vtu([9, 5, 3], "7 8 9")).unwrap();
+    let [curves, surfaces] = measures(&mesh);
+    assert_eq!((curves["9"], surfaces["7"], surfaces["8"]), (2.0, 2.0, 1.0));
+    let solid = read("part.vtu", &vtu([10, 5, 3], "7 8 9")).unwrap_err();
+    assert!(solid.contains("part.vtu: element 1 has 4 nodes in 3 dimensions"), "{solid}");
+}
+
+/// The nodes and elements of an n×n square of quadrilaterals in Abaqus, of order 1 or 2. Its nodes are moved by `at`.
+fn quadrilaterals(n: usize, order: usize, at: impl Fn([f64; 2]) -> [f64; 2]) -> String {
+    let points = order * n + 1;
+    let mut text = "** a square,\n*Heading\n*Node\n".to_owned();
+    let label = |i: usize, j: usize| 10 + i + 100 * j;
+    for (i, j) in (0..points).flat_map(|j| (0..points).map(move |i| (i, j))) {
+        let [x, y] = at([i, j].map(|k| k as f64 / (points - 1) as f64));
+        writeln!(text, "{}, {x}, {y}, 0.", label(i, j)).unwrap();
+    }
+    writeln!(text, "*Element, type=CPE{}R, elset=Body", 4 * order).unwrap();
+    let mut element = 0;
+    for (i, j) in (0..n).flat_map(|j| (0..n).map(move |i| (order * i, order * j))) {
+        element += 1;
+        let o = order;
+        let mut nodes = vec![[i, j], [i + o, j], [i + o, j + o], [i, j + o]];
+        if o == 2 {
+            nodes.extend([[i + 1, j], [i + 2, j + 1], [i + 1, j + 2], [i, j + 1]]);
+        }
+        let nodes: Vec<_> = nodes.into_iter().map(|[i, j]| label(i, j).to_string()).collect();
+        // Lines may go on after a comma.
+        writeln!(text, "{element}, {},\n {}", nodes[..3].join(", "), nodes[3..].join(", "))
+            .unwrap();
+    }
+    let last = points - 1;
+    write!(
+        text,
+        "*Nset, nset=BOTTOM, generate\n {}, {}, 1\n*Elset, elset=Right, generate\n {n}, {}, {n}\n\
+         *Surface, type=ELEMENT, name=right\nRIGHT, S2\n*Surface, type=ELEMENT, name=top\n",
+        label(0, 0),
+        label(last, 0),
+        n * n
+    )
+    .unwrap();
+    (n * (n - 1) + 1..=n * n).for_each(|e| writeln!(text, "{e}, S3").unwrap());
+    write!(text, "*Step\n*Static\n*Node output, nset=bottom\nU\n*End step\n").unwrap();
+    text
+}
+
+#[test]
+fn quadrilaterals_are_cut_along_their_shorter_diagonals() {
+    for (n, order) in [(1, 1), (4, 1), (1, 2), (3, 2)] {
+        for shear in [-0.4, 0.0, 0.7] {
+            let mesh = abaqus(&quadrilaterals(n, order, |[x, y]| [x + shear * y, y])).unwrap();
+            let side = 1.0_f64.hypot(shear);
+            check_laws(&mesh, 1.0, 2.0 + 2.0 * side, 0);
+            assert_eq!(mesh.triangles.len(), 2 * n * n);
+            for (name, value) in [("BOTTOM", 1.0), ("right", side), ("top", 1.0)] {
+                close(curve_length(&mesh, name), value);
+            }
+            assert_eq!(mesh.surfaces["Body"].len(), 2 * n * n);
+            assert_eq!(mesh.surfaces["Right"].len(), 2 * n);
+            // Each inner edge that is parallel to no side is the shorter diagonal.
+            let shorter = 1.0_f64.hypot(1.0 - shear.abs()) / n as f64;
+            let sides = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+            let edges: BTreeSet<[usize; 2]> = sides.map(sorted).collect();
+            let lengths = edges.iter().map(|&[a, b]| distance(mesh.nodes[a], mesh.nodes[b]));
+            let diagonals = lengths.filter(|length| (length - shorter).abs() < 1e-12).count();
+            assert!(diagonals >= n * n, "{shear}: {diagonals} of {n}×{n} are short");
+        }
+    }
+    // A dart: its shorter diagonal lies outside.
+    let dart = "*NODE\n1, 0, 0\n2, 2, -1\n3, 0.5, 0\n4, 2, 1\n*ELEMENT, TYPE=S4\n1, 1, 2, 3, 4\n";
+    let mesh = abaqus(dart).unwrap();
+    close(triangle_areas(&mesh).sum(), 0.5);
+}
+
+#[test]
+fn curved_sides_of_quadratic_elements_are_kept() {
+    // The square is bent into a quarter of a ring with radii 1 and 2.
+    let ring = |[x, y]: [f64; 2]| {
+        let (sin, cos) = (y * std::f64::consts::FRAC_PI_2).sin_cos();
+        [(1.0 + x) * cos, (1.0 + x) * sin]
+    };
+    let area = 0.75 * std::f64::consts::PI;
+    let error = |order| {
+        let mesh = abaqus(&quadrilaterals(8, order, ring)).unwrap();
+        (curved_area(&mesh) - area).abs()
+    };
+    assert!(error(1) > 1e-2 && error(2) < 1e-4, "{} {}", error(1), error(2));
+}
+
+#[test]
+fn sets_are_found_whatever_their_spelling() {
+    let base = quadrilaterals(2, 1, |at| at);
+    let within = |more: &str| abaqus(&format!("{base}{more}")).unwrap();
+    let length = |mesh: &Mesh, name: &str| curve_length(mesh, name);
+    // Sets of sets, of an instance, nodes of a surface, whole elements of a surface, and line elements.
+    let mesh = within("*NSET,NSET=\"both sides\", instance=part-1-1\nbottom, 210, 211, 212\n");
+    close(length(&mesh, "both sides"), 2.0);
+    close(length(&within("*SURFACE, NAME=f, TYPE=NODE\nbottom,\n"), "f"), 1.0);
+    close(length(&within("*Surface,\n type=element, name=all\nbody,\n"), "all"), 4.0);
+    close(length(&within("*Element, type=T2D2, elset=bar\n99, 10, 11\n"), "bar"), 0.5);
+    // Parts that the program made itself are no names.
+    let hidden =
+        within("*Elset, elset=_right_S2, internal\n 2, 4\n*Surface, name=r2\n_right_S2, S2\n");
+    close(length(&hidden, "r2"), 1.0);
+    assert!(!hidden.surfaces.contains_key("_right_S2"), "{:?}", hidden.surfaces.keys());
+    // All elements belong to the body, in whatever set.
+    let part = base.replace(", elset=Body", "");
+    close(triangle_areas(&abaqus(&part).unwrap()).sum(), 1.0);
+    // One instance may be moved.
+    let moved = within("*Instance, name=a, part=b\n 10., 20., 0.\n*End instance\n");
+    let least = moved.nodes.iter().fold([f64::MAX; 2], |m, p| [m[0].min(p[0]), m[1].min(p[1])]);
+    assert_eq!(least, [10.0, 20.0]);
+}
+
+#[test]
+fn malformed_files_are_refused_with_their_place() {
+    let base = quadrilaterals(1, 1, |at| at);
+    let plane = "the mesh must be plane";
+    let cases: [(&str, &str, &[&str]); 14] = [
+        ("a.inp", "", &["a.inp: there are no triangles or quadrilaterals", plane]),
+        ("a.inp", "hello\n", &["a.inp: there are no triangles"]),
+        ("a.inp", "*NODE\n1, zero, 0\n", &["a.inp, line 2: `1, zero, 0` is wrong in *NODE"]),
+        ("a.inp", "*ELEMENT\n1, 2, 3\n", &["a.inp, line 2", "TYPE"]),
+        ("a.inp", "*ELEMENT, TYPE=C3D8\n1, 2, 3\n", &["line 2: elements of type C3D8", plane]),
+        ("a.inp", "*ELEMENT, TYPE=CAX4\n1, 2, 3\n", &["line 2: elements of type CAX4", plane]),
+        ("a.inp", "*ELEMENT, TYPE=CPS3\n1, 2, 3, 4\n", &["element 1 refers to node 2"]),
+        ("a.inp", "*ELEMENT, TYPE=CPS5\n1, 2, 3, 4, 5, 6\n", &["element 1 has 5 nodes", plane]),
+        ("a.inp", "*NSET, NSET=a\nb\n", &["a.inp, line 2: there is no set b above"]),
+        ("a.inp", "*INCLUDE, INPUT=lost.inp\n", &["line 1: the file lost.inp does not exist"]),
+        ("a.inp", "*PART, NAME=a\n*PART, NAME=b\n", &["line 2: there are several parts"]),
+        ("a.unv", "    -1\n  2411\nx\n", &["a.unv: there are no triangles"]),
+        ("a.vtu", "<VTKFile", &["a.vtu: it cannot be read as .vtu", "export it as"]),
+        (
+            "a.bdf",
+            "CTRIA3  1       1       1       2       9\n",
+            &["a.bdf: it cannot be read as .bdf"],
+        ),
+    ];
+    for (name, text, fragments) in cases {
+        let message = read(name, text).unwrap_err();
+        for fragment in fragments {
+            assert!(message.contains(fragment), "`{fragment}` is not in `{message}` for {text}");
+        }
+        assert_eq!(message.lines().count(), 1, "{message}");
+    }
+    let side = abaqus(&(base.clone() + "*SURFACE, NAME=s\n1, S5\n")).unwrap_err();
+    assert!(side.contains("surface s: element 1 is missing or has no side S5"), "{side}");
+    let tilted = abaqus(&base.replace("0.\n", "1.\n").replacen("1.\n", "2.\n", 1)).unwrap_err();
+    assert!(tilted.contains("the body must lie in a plane of constant z"), "{tilted}");
+}
+
+#[test]
+fn a_conversion_is_kept_beside_the_file_until_this_changes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [inp, kept] = ["part.inp", "part.inp.msh"].map(|name| folder.path().join(name));
+    let convert = |n: usize| {
+        fs::write(&inp, quadrilaterals(n, 1, |at| at)).unwrap();
+        load(&inp, &BTreeMap::new(), Order::Quadratic).unwrap().triangles.len()
+    };
+    assert_eq!(convert(2), 8);
+    let first = fs::metadata(&kept).unwrap().modified().unwrap();
+    assert_eq!(convert(2), 8);
+    assert_eq!(fs::metadata(&kept).unwrap().modified().unwrap(), first);
+    assert_eq!(convert(3), 18);
+    // Also where a file that it reads is changed.
+    let nodes =
+        quadrilaterals(1, 1, |at| at).replace("*Node\n", "*node,\n input = nodes.txt\n*Heading\n");
+    for side in [1.0, 2.0] {
+        let points = ["10, 0, 0", "11, SIDE, 0", "110, 0, SIDE", "111, SIDE, SIDE"].join("\n");
+        fs::write(inp.with_file_name("nodes.txt"), points.replace("SIDE", &side.to_string()))
+            .unwrap();
+        fs::write(&inp, &nodes).unwrap();
+        let mesh = load(&inp, &BTreeMap::new(), Order::Linear).unwrap();
+        close(triangle_areas(&mesh).sum(), side * side);
+    }
+    // A file of the user stays.
+    fs::write(&kept, "mine").unwrap();
+    assert_eq!((convert(1), &*fs::read_to_string(&kept).unwrap()), (2, "mine"));
+}
