@@ -55,7 +55,7 @@ use crate::{
     mesh::{Lines, Mesh},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Scene, Stepping, TimeGrid},
+    scene::{Boundary, Scene, Stepping, TimeGrid},
 };
 use boundary_conditions::BoundaryConditions;
 use nalgebra::DVector;
@@ -121,12 +121,16 @@ pub struct LoadCase {
 }
 
 impl DiscreteProblem {
-    /// Binds `scene` to `mesh` and checks at sampled times that a solution exists. If the body loses its support at
+    /// Binds `scene` to `mesh`, in which boundaries with `where` get their edges if it has no curves of these names, and checks at sampled times that a solution exists. If the body loses its support at
     /// some time, the scene ends just before.
     ///
     /// # Errors
     /// The scene does not fit the mesh, contradicts itself, or its load drives a rigid motion from the start.
-    pub fn new(scene: Scene, mesh: Mesh) -> Result<Self, SetupError> {
+    pub fn new(scene: Scene, mut mesh: Mesh) -> Result<Self, SetupError> {
+        let is_there = |of: &Boundary| of.selection.is_none() || mesh.curves.contains_key(&of.name);
+        if !scene.boundaries.iter().all(is_there) {
+            scene.name_edges(&mut mesh)?;
+        }
         scene.check_mesh(&mesh)?;
         let mut body = Body::new(mesh, scene.order);
         body.materials = scene.materials_of(&body.mesh);

@@ -81,7 +81,8 @@ fn history() {
 #[test]
 fn stopped_at_the_threshold() {
     let test_directory = TestDirectory::new();
-    let said = test_directory.run(&["--set", "damage.lambda_u=1e4"]);
+    let sets = ["damage.lambda_u=1e4", "time.scheme=euler"];
+    let said = test_directory.run(&self::sets(&sets));
     assert!(said.out.contains("STOPPED") && said.out.contains("ζ_*"), "{}", said.out);
     let summary = test_directory.summary("out/scene");
     let (stopped, end) = (number(&summary["stopped_at"]), number(&summary["end_time"]));

@@ -283,7 +283,7 @@ pub fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str)
             "mesh.file = 'square.msh'
              material = {{ young = {young}, poisson = 0.3, plane = 'stress' }}
              damage = {{ {damage} }}
-             time = {{ end = 1, step = 0.1 }}
+             time = {{ end = 1, step = 0.1, scheme = 'euler' }}
              boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', symmetry = true }},
                          {{ name = 'top', {top} }}]"
         ),

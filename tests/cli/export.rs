@@ -18,7 +18,7 @@ Physical Curve(\"axis\") = {6}; Physical Surface(\"soft\") = {1}; Physical Surfa
 const SCENE: &str = "mesh = { file = \"block.geo\" }
 material = { young = 80, poisson = 0.3, plane = \"stress\", hard = { young = 200 } }
 damage = { diffusion = 0.02, lambda_d = 0.1, lambda_u = 5e3, hard = { diffusion = 0.05 } }
-time = { end = 0.4, step = 0.1 }
+time = { end = 0.4, step = 0.1, scheme = \"euler\" }
 contact = { tolerance = 1e-11 }
 [[boundary]]
 name = \"top\"

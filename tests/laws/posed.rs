@@ -266,3 +266,22 @@ fn surfaces_that_the_mesh_does_not_have_or_that_overlap_are_refused() {
     let common = refusal("upper = { young = 2 }, all = { young = 3 }");
     assert!(common.contains("material.upper and \"all\" have a triangle at ("), "{common}");
 }
+
+/// A library's mesh without the curve gets it by `where` when it meets the scene, and has then the same answer.
+#[test]
+fn a_boundary_by_place_needs_no_name_in_the_mesh() {
+    let text = |base: &str| {
+        format!(
+            "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             boundary = [{{ name = 'left', displacement = [0, 0] }}, {{ {base}, gap = 0 }}, {{ name = 'top', pressure = 3 }}]"
+        )
+    };
+    let answer = |base: &str| {
+        let problem = problem(square(4), &text(base)).unwrap_or_else(|e| panic!("{e}"));
+        run(&problem, SOLVERS[0]).last.state.u
+    };
+    let mut unnamed = square(4);
+    unnamed.curves.remove("bottom");
+    let by_place = problem(unnamed, &text("name = 'base', where = 'y < 1e-9'")).unwrap();
+    assert_eq!(run(&by_place, SOLVERS[0]).last.state.u, answer("name = 'bottom'"));
+}
