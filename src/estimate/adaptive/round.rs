@@ -227,11 +227,12 @@ impl<'a> Round<'a> {
     /// together they may cause the part that the others leave. The ends of contact are known up to half of an edge.
     fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
         let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
-        let (mut of_reactions, mut of_length) = (0, 0);
+        let (mut of_reactions, mut of_length, mut points) = (0, 0, Vec::new());
         for (excess, cause) in self.missed(measured) {
             match cause {
                 Cause::Ends => of_length = 2,
                 Cause::Reactions => of_reactions = of_reactions.max(halvings(excess / AIM)),
+                Cause::Around(at, _) => points.push((at, 1)),
                 _ => {}
             }
         }
@@ -244,6 +245,6 @@ impl<'a> Round<'a> {
         let open = if is_known { self.open } else { 0.0 };
         let at_ends = halvings(open / AIM).max(of_length).max(of_reactions);
         let ends = self.run.extremes.ends.as_flattened().iter().map(|&end| (end, at_ends));
-        singular.chain(ends).filter(|(_, levels)| *levels > 0).collect()
+        singular.chain(ends).chain(points).filter(|(_, levels)| *levels > 0).collect()
     }
 }
