@@ -1,10 +1,12 @@
 //! A damage law of one's own in the loop of signorini: only tension damages.
 //!
 //! The paper's source φ = −(λ_D (1 − ζ)/ζ + ½ λ_U min(|ε|², q*) − λ_W)₊ does not distinguish tension and compression.
-//! `cargo run --example own_law` presses and pulls a block by both laws. Where all strains are tensile they agree.
+//! `cargo run --example own_law` presses and pulls a block by both laws. Where all strains are tensile they agree. Then a mesh
+//! is made for an accuracy, and a run on it prints the figures with their bars.
 
 use signorini::{
-    estimate::Simulation,
+    estimate::{Simulation, adapted},
+    evolution::Choices,
     mesh::Mesh,
     model::{DamagePoint, DamageSource},
     nalgebra::{Matrix2, Vector3},
@@ -27,7 +29,7 @@ impl DamageSource for TensionOnly {
 }
 
 /// A block 1 m × 1 m between two symmetry axes under `traction`, Pa, on its top, and unsupported at its right.
-fn block(traction: f64) -> Result<DiscreteProblem, Box<dyn std::error::Error>> {
+fn block(traction: &str) -> Result<Scene, Box<dyn std::error::Error>> {
     let text = format!(
         r#"
         mesh.file = "block.msh"
@@ -37,27 +39,39 @@ fn block(traction: f64) -> Result<DiscreteProblem, Box<dyn std::error::Error>> {
         boundary = [
             {{ name = "left", symmetry = true }},
             {{ name = "bottom", symmetry = true }},
-            {{ name = "top", traction = [0, {traction}] }},
+            {{ name = "top", traction = [0, "{traction}"] }},
         ]
         "#
     );
-    let scene = Scene::parse(&text, "block.toml".as_ref(), &[])?;
-    Ok(DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, 4, 4))?)
+    Ok(Scene::parse(&text, "block.toml".as_ref(), &[])?)
 }
 
 /// Runs the block pulled and pressed.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let session = Session::start(&[])?;
-    for (what, traction) in [("pulled", 5.0), ("pressed", -5.0)] {
-        let problem = block(traction)?;
+    let mesh = Mesh::rectangle(1.0, 1.0, 4, 4);
+    for (what, traction) in [("pulled", "5"), ("pressed", "-5")] {
+        let problem = DiscreteProblem::new(block(traction)?, mesh.clone())?;
         let own = Simulation::new(&problem).law(Box::new(TensionOnly)).run(&session)?;
         let ours = Simulation::new(&problem).run(&session)?;
         let [own, ours] = [own, ours].map(|outcome| outcome.last.record.zeta_min);
         println!("{what}: min ζ = {own} by tension only, {ours} by the paper's law");
         assert!(ours < 0.98, "the paper's law damages under both loads");
-        let expected = if traction > 0.0 { ours } else { 1.0 };
+        let expected = if what == "pulled" { ours } else { 1.0 };
         assert!((own - expected).abs() < 1e-12);
     }
+    let scene = block("5 - 10*x")?;
+    let choices = Choices::of(&scene).law(Box::new(TensionOnly));
+    let adapted = adapted(&session, &scene, mesh, &choices, 0.05, &mut |_| {})?;
+    let problem = DiscreteProblem::new(scene, adapted.mesh)?;
+    let mut outcome = Simulation::new(&problem).choices(&choices).run(&session)?;
+    outcome.set_bars(&problem, &adapted.measured)?;
+    for (figure, value) in problem.figures.iter().zip(&outcome.last.figures) {
+        if let Some(bar) = outcome.bars.iter().find(|bar| bar.name == figure.name) {
+            println!("{}: {} ± {}", figure.name, value.value, bar.bar);
+        }
+    }
+    assert!(outcome.bars.iter().any(|bar| bar.name == "zeta_min"));
     Ok(())
 }
 

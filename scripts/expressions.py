@@ -44,7 +44,7 @@ class Expression:
             # In Python the power is **, and `if` is not a function.
             text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
             tree = _Functions().visit(ast.parse(text, mode="eval"))
-            names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table", "spline"] if folder else [])}
+            names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table", "spline", "pchip"] if folder else [])}
             for node in ast.walk(tree):
                 if not isinstance(node, ALLOWED):
                     raise ExpressionError(f"expression '{self.text}': {type(node).__name__} is not allowed")
@@ -60,7 +60,8 @@ class Expression:
             return rows[~np.isnan(rows).any(axis=1)].T
 
         tables = {"table": lambda name, argument=t: np.interp(argument, *points(name)),
-                  "spline": lambda name, argument=t: spline(argument, *points(name))}
+                  "spline": lambda name, argument=t: smooth(argument, *points(name), twice_differentiable),
+                  "pchip": lambda name, argument=t: smooth(argument, *points(name), monotone)}
         return eval(self._code, {"__builtins__": {}}, {**functions, **tables, "x": x, "y": y, "t": t})
 
     def at(self, points, t=0.0):
@@ -70,19 +71,27 @@ class Expression:
         return np.broadcast_to(np.asarray(values, float), len(points)).copy()
 
 
-def spline(at, a, f):
-    """The monotone piecewise cubic function through points (a, f), constant beyond them; two points with the same a are a
-    jump, which divides it."""
+def smooth(at, a, f, slopes):
+    """The piecewise cubic function through points (a, f) with these slopes, constant beyond them; two points with the same a
+    are a jump, which divides it."""
     values, first = np.full(np.shape(at), f[0], float), [0, *np.flatnonzero(np.diff(a) == 0.0) + 1]
     for i, j in zip(first, [*first[1:], len(a)]):
-        values = np.where(at >= a[i], _without_jumps(np.clip(at, a[i], a[j - 1]), a[i:j], f[i:j]), values)
+        values = np.where(at >= a[i], _without_jumps(np.clip(at, a[i], a[j - 1]), a[i:j], f[i:j], slopes), values)
     return values
 
 
-def _without_jumps(at, a, f):
+def _without_jumps(at, a, f, slopes):
     if len(a) < 3:
         return np.interp(at, a, f)
     h, s = np.diff(a), np.diff(f) / np.diff(a)
+    d = slopes(h, s)
+    i = np.clip(np.searchsorted(a, at, side="right") - 1, 0, len(h) - 1)
+    z, s, p, q = (at - a[i]) / h[i], s[i], d[i], d[i + 1]
+    return f[i] + z * h[i] * (p + z * (3.0 * s - 2.0 * p - q + z * (p + q - 2.0 * s)))
+
+
+def monotone(h, s):
+    """The slopes of PCHIP, for intervals of lengths h with secant slopes s."""
     w, v = h[:-1] + 2.0 * h[1:], 2.0 * h[:-1] + h[1:]
     rises = s[:-1] * s[1:] > 0.0
     inner = (w + v) / (w / np.where(rises, s[:-1], 1.0) + v / np.where(rises, s[1:], 1.0)) * rises
@@ -90,10 +99,21 @@ def _without_jumps(at, a, f):
     def end(i, j):
         return np.clip(s[i] + h[i] / (h[i] + h[j]) * (s[i] - s[j]), *sorted((0.0, 3.0 * s[i])))
 
-    slopes = np.array([end(0, 1), *inner, end(-1, -2)])
-    i = np.clip(np.searchsorted(a, at, side="right") - 1, 0, len(h) - 1)
-    z, s, p, q = (at - a[i]) / h[i], s[i], slopes[i], slopes[i + 1]
-    return f[i] + z * h[i] * (p + z * (3.0 * s - 2.0 * p - q + z * (p + q - 2.0 * s)))
+    return np.array([end(0, 1), *inner, end(-1, -2)])
+
+
+def twice_differentiable(h, s):
+    """The slopes of the cubic spline whose first and last inner points are no knots; of three points those of a parabola."""
+    n = len(h) + 1
+    matrix, right, i = np.zeros((n, n)), np.zeros(n), np.arange(1, n - 1)
+    matrix[i, i - 1], matrix[i, i], matrix[i, i + 1] = h[1:], 2.0 * (h[1:] + h[:-1]), h[:-1]
+    right[1:-1] = 3.0 * (h[1:] * s[:-1] + h[:-1] * s[1:])
+    for row, (near, i, j) in ((0, (1, 0, 1)), (n - 1, (n - 2, -1, -2))):
+        parabola = n == 3
+        matrix[row, row], matrix[row, near] = (1.0, 1.0) if parabola else (h[j], h[i] + h[j])
+        right[row] = (2.0 * s[i] if parabola
+                      else ((3.0 * h[i] + 2.0 * h[j]) * h[j] * s[i] + h[i] ** 2 * s[j]) / (h[i] + h[j]))
+    return np.linalg.solve(matrix, right)
 
 
 def with_values(scene, folder):
@@ -103,7 +123,7 @@ def with_values(scene, folder):
 
     def number(text):
         try:
-            varies = re.search(r"\b([xyt]|table|spline)\b", text)
+            varies = re.search(r"\b([xyt]|table|spline|pchip)\b", text)
             return None if varies else float(Expression(text, folder)(0.0, 0.0, 0.0))
         except (ExpressionError, TypeError, ValueError, ArithmeticError, OSError):
             return None

@@ -64,7 +64,7 @@ def run(scene, *options, out=None, **overrides):
     sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
     with _written(scene) as (path, name):
         out = Path(out or Path("out") / name)
-        _call("run", str(path), "--out", str(out), *sets, *options)
+        _call("run", str(path), "--out", str(out), *sets, *map(str, options))
     return load(out)
 
 
@@ -138,12 +138,13 @@ def _keys(overrides, prefix=""):
 
 
 def table(folders, columns=None):
-    """A pandas frame with a row per folder: the settings in which the runs differ, and columns of summary.json with
+    """A pandas frame with a row per folder (or its Run): the settings in which the runs differ, and columns of summary.json with
     their bars, as `signorini table` prints them. Its `attrs["units"]` are the units by column."""
     import pandas
 
     from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
 
+    folders = [getattr(folder, "folder", folder) for folder in folders]
     summaries, columns = [summary_of(folder) for folder in folders], list(columns or COLUMNS)
     if columns != list(COLUMNS) and (problems := list(unknown(columns, summaries))):
         raise ValueError("; ".join(problems))

@@ -121,7 +121,7 @@ def inputs_of(scene):
     """The scene's file, its mesh or geometry, and its tables; those that exist."""
     scene = Path(scene)
     text = scene.read_text(encoding="utf-8") if scene.exists() else ""
-    names = re.findall(r"""["']([^"'()]+\.\w+)["']|(?:table|spline)\(["']([^"']+)["']""", text)
+    names = re.findall(r"""["']([^"'()]+\.\w+)["']|(?:table|spline|pchip)\(["']([^"']+)["']""", text)
     files = [scene, *(scene.parent / name for pair in names for name in pair if name)]
     return [file for file in files if file.exists()]
 

@@ -14,7 +14,7 @@ use signorini::{
     problem::{DiscreteProblem, LoadCase, State},
     scene::rounded,
 };
-use std::{iter::zip, path::PathBuf};
+use std::{fs, iter::zip, path::PathBuf};
 
 /// Arguments of `signorini export`.
 #[derive(Args)]
@@ -38,7 +38,6 @@ type Row = Vec<(usize, f64)>;
 pub fn export(arguments: &ExportArguments) -> Result<(), Failure> {
     require_one_process()?;
     arguments.scene.check()?;
-    create(&arguments.out).map_err(Failure::input)?;
     let session = Session::start(&[])?;
     let exported = run(arguments, &session);
     session.finalize()?;
@@ -77,6 +76,10 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     });
     files.push(("export.json", format!("{description:#}\n")));
     files.push(("README.md", include_str!("export.md").to_owned()));
+    create(out).map_err(Failure::input)?;
+    // Files of an earlier export, of a step with other matrices.
+    let stale = ["u_D", "g", "M", "L", "source", "zeta_before"].map(|name| out.join(name));
+    stale.iter().for_each(|path| drop(fs::remove_file(path.with_extension("mtx"))));
     files.iter().try_for_each(|(name, text)| write_whole(&out.join(name), text.as_bytes()))?;
     let end = rounded(states[0].time);
     say(&screen::row("results", format!("t = {end}: {}/README.md names them", out.display())));

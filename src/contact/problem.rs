@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct ContactProblem<'a> {
     /// PETSc.
     pub session: &'a Session,
-    /// K, N/m.
+    /// K, N/m. `LinearSystem::of` makes the linear system for [`LinearSolver`](crate::linear::LinearSolver) of it.
     pub stiffness: &'a Matrix,
     /// The size of the diagonal of K, N/m.
     pub stiffness_scale: f64,

@@ -56,7 +56,8 @@ impl<'a> Simulation<'a> {
         Self { choices: self.choices.solver_named(name), ..self }
     }
 
-    /// Takes a damage source of another author. The scene must have `[damage]`, whose constants the source may use.
+    /// Takes a damage source of another author. The scene must have `[damage]`, whose constants the source may use, and
+    /// `[time]`; otherwise the run is refused.
     #[must_use]
     pub fn law(self, source: Box<dyn DamageSource>) -> Self {
         Self { choices: self.choices.law(source), ..self }

@@ -1,5 +1,6 @@
 //! The exchangeable parts of a run.
 
+use super::{DiscreteProblem, RunError};
 use crate::{
     contact::{ChosenSolver, ContactSolver},
     model::{DamageSource, Fremond},
@@ -12,7 +13,8 @@ use std::rc::Rc;
 #[derive(Clone)]
 pub struct Choices {
     pub(crate) solver: ChosenSolver,
-    pub(crate) source: Rc<dyn DamageSource>,
+    /// `None`: the paper's.
+    source: Option<Rc<dyn DamageSource>>,
 }
 
 impl Choices {
@@ -23,7 +25,18 @@ impl Choices {
 
     /// The solver called `name` and the paper's damage source. A run tells whether there is a solver of this name.
     pub fn named(name: &str) -> Self {
-        Self { solver: ChosenSolver::Named(name.to_owned()), source: Rc::new(Fremond) }
+        Self { solver: ChosenSolver::Named(name.to_owned()), source: None }
+    }
+
+    /// The damage source of `problem`.
+    ///
+    /// # Errors
+    /// A source of another author is given, but the scene has no evolving damage.
+    pub(crate) fn source(&self, problem: &DiscreteProblem) -> Result<&dyn DamageSource, RunError> {
+        match &self.source {
+            Some(_) if problem.damage().is_none() => Err(RunError::NoDamage),
+            source => Ok(source.as_deref().unwrap_or(&Fremond)),
+        }
     }
 
     /// The same with the solver called `name`.
@@ -41,6 +54,6 @@ impl Choices {
     /// The same with another damage source.
     #[must_use]
     pub fn law(self, source: Box<dyn DamageSource>) -> Self {
-        Self { source: Rc::from(source), ..self }
+        Self { source: Some(Rc::from(source)), ..self }
     }
 }

@@ -37,6 +37,11 @@ pub enum RunError {
     /// The contact solver does not exist, or it cannot solve this problem.
     #[error(transparent)]
     Solver(#[from] SolverError),
+    /// A damage source of another author has nothing to do.
+    #[error(
+        "a damage law is given, but the scene has no evolving damage: it needs [damage] and [time]"
+    )]
+    NoDamage,
     /// The scene contradicts itself at some time.
     #[error(transparent)]
     Setup(#[from] SetupError),

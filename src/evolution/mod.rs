@@ -78,7 +78,7 @@ pub(crate) fn all_steps<'a>(
     saved: Option<RunState>,
     followed: &'a [f64],
 ) -> Result<Run<'a>, RunError> {
-    let law = &*choices.source;
+    let law = choices.source(problem)?;
     let damage_step = DamageStep { session, problem, phases, law, system: None, loaded: None };
     let mut contact_step = ContactStep::new(session, problem, choices, phases)?;
     let (zeta, start) = (problem.initial_damage(), problem.scene().start());

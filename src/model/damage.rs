@@ -12,7 +12,7 @@ pub struct DamagePoint<'a> {
     pub strain: &'a Vector3<f64>,
     /// ζ.
     pub zeta: f64,
-    /// The constants of the material.
+    /// The constants κ, λ_D, λ_U, λ_W, q* and ζ_* of the material. A source that needs E and ν brings its own.
     pub law: &'a DamageLaw,
 }
 

@@ -12,7 +12,7 @@ use std::{
     path::{Path, PathBuf},
     sync::Arc,
 };
-use table::Table;
+use table::{Shape, Table};
 use toml::Value;
 
 pub(super) use parser::{WITHOUT_VALUE, refused_name};
@@ -31,15 +31,15 @@ const HIGHEST: usize = 2 * DEEPEST;
 ///
 /// Known are the variables `x`, `y`, `t`, the constant `pi`, the operators `+ - * / ^`, the
 /// comparisons `< <= > >= == !=`, `and`, `or`, and the functions `sin cos tan sqrt exp log abs min max
-/// atan2 if table spline` (`log` is natural; `min`, `max` and `atan2` take two arguments). Precedence is that
+/// atan2 if table spline pchip` (`log` is natural; `min`, `max` and `atan2` take two arguments). Precedence is that
 /// of mathematics: `-x^2` is −(x²), `2^3^2` is 2^(3²), and `t < 1 and x > 2` needs no brackets.
 ///
 /// A true comparison is 1, a false one 0, and any number except 0 counts as true. `if(c, a, b)` is a where c
 /// is true and b elsewhere; the value of the other one does not matter there. `table("file.csv")` is
 /// piecewise linear in t, `table("file.csv", a)` in a, through the two columns of a file. It is constant
 /// before the first row and after the last. Two rows with the same first number make a jump, at which the
-/// second row counts. `spline` is the same with a monotone cubic function between two rows, whose derivative is continuous
-/// except at jumps. A NaN in an argument gives NaN, except in the argument that `if` does not use.
+/// second row counts. `spline` is the same with a cubic function between two rows, whose second derivative is continuous
+/// except at jumps; that of `pchip` is monotone, and its first derivative is continuous. A NaN in an argument gives NaN, except in the argument that `if` does not use.
 ///
 /// ```
 /// use signorini::scene::Expression;

@@ -199,3 +199,15 @@ fn a_mesh_for_an_accuracy_and_its_bars_are_those_of_our_parts() {
         close(own.bar / ours.scale, ours.bar / ours.scale, 1e-4);
     }
 }
+
+#[test]
+fn a_source_without_damage_to_do_is_refused() {
+    let text = own_solver::SCENE.replace("mesh.file = \"block.msh\"", "");
+    let undamaged =
+        Vec::from_iter(text.lines().filter(|line| !line.starts_with("damage"))).join("\n");
+    let problem = DiscreteProblem::new(scene(&undamaged), square(4)).unwrap();
+    let session = Session::start(&[]).unwrap();
+    let run = Simulation::new(&problem).law(Box::new(Source(paper))).run(&session);
+    let message = run.expect_err("there is no damage").to_string();
+    assert!(message.ends_with("it needs [damage] and [time]"), "{message}");
+}

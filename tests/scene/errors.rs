@@ -120,7 +120,7 @@ error: bad.toml:20: time.step must be a number: positive (s), or "auto", but is 
    |
 20 | step = "fast"
    | ^^^^^^^^^^^^^
-error: bad.toml:33: boundary.load.traction[1] has the unknown variable `s` (known: x, y, t, pi, sin, cos, tan, sqrt, exp, log, abs, min, max, atan2, if, table, spline)
+error: bad.toml:33: boundary.load.traction[1] has the unknown variable `s` (known: x, y, t, pi, sin, cos, tan, sqrt, exp, log, abs, min, max, atan2, if, table, spline, pchip)
    |
 33 | traction = ["0", "-80*s"]
    |                  ^^^^^^^

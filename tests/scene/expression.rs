@@ -419,11 +419,60 @@ fn malformed_tables_are_refused_with_their_line() {
     }
 }
 
-/// The smooth function through points (a, f).
-fn spline(points: &[[f64; 2]]) -> impl Fn(f64) -> f64 + use<> {
+/// The function called `name` through points (a, f).
+fn through(name: &str, points: &[[f64; 2]]) -> impl Fn(f64) -> f64 + use<> {
     let rows: Vec<String> = points.iter().map(|[a, f]| format!("{a:?},{f:?}")).collect();
-    let spline = table(&rows.join("\n"), "spline('load.csv', x)").expect("a spline");
-    move |x| spline.eval(x, 0.0, 0.0)
+    let function = table(&rows.join("\n"), &format!("{name}('load.csv', x)")).expect("a table");
+    move |x| function.eval(x, 0.0, 0.0)
+}
+
+/// Values of scipy.interpolate.CubicSpline (SciPy 1.10), whose ends are no knots: a cubic function is itself, as is the
+/// parabola of three points.
+#[test]
+fn splines_are_those_of_other_programs() {
+    let f = through(
+        "spline",
+        &[
+            [-2.0, 3.0],
+            [-1.5, 1.0],
+            [-0.25, -0.5],
+            [0.0, -0.5],
+            [0.75, 0.25],
+            [2.0, 0.125],
+            [2.125, 2.0],
+            [4.0, 2.5],
+        ],
+    );
+    for (x, expected) in [
+        (-1.75, 1.850062254571168),
+        (-1.0, -0.0002490182846720812),
+        (-0.125, -0.5342232544827777),
+        (0.5, 0.2898626143606293),
+        (1.25, -1.6419287430813299),
+        (2.0625, 0.9963044879161446),
+        (2.75, 15.274511419395264),
+        (3.9, 8.01289811936607),
+    ] {
+        assert!((f(x) - expected).abs() < 1e-13, "{x}: {} is not {expected}", f(x));
+    }
+    let exact = |count: i32, of: fn(f64) -> f64| {
+        let at = |i: i32| f64::from(i) + 0.3 * f64::from(i).sin();
+        let points = Vec::from_iter((0..count).map(|i| [at(i), of(at(i))]));
+        let f = through("spline", &points);
+        for i in 0..50 {
+            let x = at(count - 1) * f64::from(i) / 50.0;
+            assert!(
+                (f(x) - of(x)).abs() < 1e-12,
+                "{count} points at {x}: {} is not {}",
+                f(x),
+                of(x)
+            );
+        }
+    };
+    exact(2, |x| 1.0 - 0.5 * x);
+    exact(3, |x| x * x - x);
+    exact(4, |x| x * x * (x - 2.0));
+    exact(9, |x| x * (x - 4.0) * (x - 7.0));
 }
 
 /// Points with random distances and values.
@@ -439,17 +488,20 @@ fn random_points(random: &mut Random, count: usize) -> Vec<[f64; 2]> {
 
 /// Values of scipy.interpolate.PchipInterpolator (SciPy 1.15).
 #[test]
-fn a_spline_is_the_function_of_other_programs() {
-    let f = spline(&[
-        [-2.0, 3.0],
-        [-1.5, 1.0],
-        [-0.25, -0.5],
-        [0.0, -0.5],
-        [0.75, 0.25],
-        [2.0, 0.125],
-        [2.125, 2.0],
-        [4.0, 2.5],
-    ]);
+fn monotone_cubics_are_those_of_other_programs() {
+    let f = through(
+        "pchip",
+        &[
+            [-2.0, 3.0],
+            [-1.5, 1.0],
+            [-0.25, -0.5],
+            [0.0, -0.5],
+            [0.75, 0.25],
+            [2.0, 0.125],
+            [2.125, 2.0],
+            [4.0, 2.5],
+        ],
+    );
     for (x, expected) in [
         (-1.75, 1.825),
         (-1.0, 0.112),
@@ -462,21 +514,21 @@ fn a_spline_is_the_function_of_other_programs() {
     ] {
         assert!((f(x) - expected).abs() < 1e-14, "{x}: {} is not {expected}", f(x));
     }
-    let f = spline(&[[0.0, 0.0], [1.0, 5.0], [3.0, 4.0]]);
+    let f = through("pchip", &[[0.0, 0.0], [1.0, 5.0], [3.0, 4.0]]);
     assert!((f(0.25) - 1.7421875).abs() < 1e-14 && (f(2.5) - 4.578125).abs() < 1e-14);
     // Ends whose slopes are limited to 0.
-    let f = spline(&[[0.0, 0.0], [1.0, 1.0], [2.0, 5.0]]);
+    let f = through("pchip", &[[0.0, 0.0], [1.0, 1.0], [2.0, 5.0]]);
     assert!((f(0.5) - 0.3).abs() < 1e-14);
 }
 
 /// Between two points the function goes from one value to the other without turning, and its derivative is continuous.
 #[test]
-fn a_spline_passes_its_points_without_overshoot_and_without_kinks() {
+fn a_monotone_cubic_passes_its_points_without_overshoot_and_without_kinks() {
     let mut random = Random::new(5);
     for count in [1, 2, 3, 4, 9, 30] {
         for _ in 0..40 {
             let points = random_points(&mut random, count);
-            let f = spline(&points);
+            let f = through("pchip", &points);
             assert!(points.iter().all(|&[a, value]| f(a) == value), "{points:?}");
             for pair in points.windows(2) {
                 let [[p, from], [q, to]] = [pair[0], pair[1]];
@@ -502,29 +554,29 @@ fn a_spline_passes_its_points_without_overshoot_and_without_kinks() {
 
 /// A jump divides the points: the functions on both sides know nothing of each other.
 #[test]
-fn a_spline_jumps_where_its_points_do() {
+fn a_smooth_function_jumps_where_its_points_do() {
     let [left, right] =
         [[[0.0, 1.0], [1.0, 3.0], [2.0, 4.0]], [[2.0, -1.0], [3.0, 7.0], [5.0, 0.0]]];
-    let [f, g] = [left, right].map(|points| spline(&points));
-    let both = spline(&[left, right].concat());
+    let [f, g] = [left, right].map(|points| through("pchip", &points));
+    let both = through("pchip", &[left, right].concat());
     [-1.0, 0.3, 1.5, 1.999].iter().for_each(|&x| assert_eq!(both(x), f(x), "{x}"));
     [2.001, 2.7, 4.0, 6.0].iter().for_each(|&x| assert_eq!(both(x), g(x), "{x}"));
     assert_eq!(both(2.0), -1.0);
 }
 
-/// Lines are exact. The error of a smooth function decreases with the third power of the distance of its points, that of a
-/// piecewise linear one with the second.
+/// Lines are exact. The error of a smooth function decreases with the fourth power of the distance of its points, if it is
+/// monotone with the third, that of a piecewise linear one with the second.
 #[test]
-fn a_spline_is_exact_for_lines_and_of_third_order_for_smooth_monotone_functions() {
+fn smooth_functions_are_exact_for_lines_and_of_their_order_for_monotone_ones() {
     let mut random = Random::new(6);
     let mut points = random_points(&mut random, 12);
     points.iter_mut().for_each(|[a, f]| *f = 3.0 - 0.7 * *a);
-    let (f, [first, last]) = (spline(&points), [points[0][0], points[11][0]]);
+    let (f, [first, last]) = (through("pchip", &points), [points[0][0], points[11][0]]);
     for i in 0..=200 {
         let x = first + (last - first) * f64::from(i) / 200.0;
         assert!((f(x) - (3.0 - 0.7 * x)).abs() < 1e-13, "{x}");
     }
-    for (function, orders) in [("spline", 2.8..3.3), ("table", 1.9..2.1)] {
+    for (function, orders) in [("spline", 3.8..4.2), ("pchip", 2.8..3.3), ("table", 1.9..2.1)] {
         let error = |n: i32| {
             let row = |i: i32| {
                 format!(
@@ -544,12 +596,12 @@ fn a_spline_is_exact_for_lines_and_of_third_order_for_smooth_monotone_functions(
 }
 
 #[test]
-fn the_range_of_a_spline_has_all_its_values_and_is_reached() {
+fn the_range_of_a_smooth_function_has_all_its_values_and_is_reached() {
     let mut random = Random::new(7);
-    for _ in 0..200 {
+    for name in ["spline", "pchip"].repeat(100) {
         let points = random_points(&mut random, 7);
         let rows: Vec<String> = points.iter().map(|[a, f]| format!("{a:?},{f:?}")).collect();
-        let f = table(&rows.join("\n"), "spline('load.csv', x)").expect("a spline");
+        let f = table(&rows.join("\n"), &format!("{name}('load.csv', x)")).expect("a table");
         let [from, length] = [8.0 + 8.0 * random.next(), 2.0 + 2.0 * random.next()];
         let [low, high] = f.range([[from, from + length], [0.0; 2], [0.0; 2]]);
         let samples = (0..=500).map(|i| f.eval(from + length * f64::from(i) / 500.0, 0.0, 0.0));
@@ -571,7 +623,7 @@ fn the_breaks_of_a_spline_are_its_jumps() {
     assert_eq!(breaks("spline"), [1.0]);
     // A pulse that is shorter than the parts that are searched.
     let rows = "0,0\n0.7,0\n0.7005,3\n0.701,0\n2,0\n";
-    let f = table(rows, "spline('load.csv')").expect("a spline");
+    let f = table(rows, "pchip('load.csv')").expect("a table");
     let breaks = f.breaks([[0.0; 2]; 2], 2.0);
     let near = |time: f64| breaks.iter().any(|found| (found - time).abs() < 1e-4);
     assert!(near(0.7005) && breaks.iter().all(|t| (0.69..0.71).contains(t)), "{breaks:?}");

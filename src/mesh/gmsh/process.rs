@@ -115,7 +115,10 @@ fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshErr
             return Ok(status);
         }
         if !told && started.elapsed() > NOTE_AFTER {
-            note(input, "gmsh is at work; a larger size is quicker");
+            note(
+                input,
+                "gmsh is at work; a larger size is quicker (sizes are in the unit of the geometry: gmsh reads .step in mm)",
+            );
             told = true;
         }
         let late = started.elapsed().as_secs_f64() > limit;

@@ -3,7 +3,7 @@
 use super::{
     DEEPEST, Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
-    MAX_LENGTH, Scope, Table, interval, truth,
+    MAX_LENGTH, Scope, Shape, Table, interval, truth,
 };
 use crate::suggestion::suggestion;
 use std::{
@@ -33,8 +33,9 @@ const NAMES: [(&str, Instruction); 15] = [
 /// The end of a message about a constant that cannot be evaluated.
 pub(in crate::scene) const WITHOUT_VALUE: &str =
     "without a value: it is wrong, or needs itself by way of others";
-/// The functions given by points in a file: piecewise linear, and smooth.
-const TABLES: [&str; 2] = ["table", "spline"];
+/// The functions given by points in a file.
+const TABLES: [(&str, Shape); 3] =
+    [("table", Shape::Linear), ("spline", Shape::Cubic), ("pchip", Shape::Monotone)];
 /// Per operator: its text, its instruction, its precedence, and the smallest precedence of operators in its
 /// right operand: `a - b - c` groups from the left, `a^b^c` from the right. A longer operator stands before
 /// the shorter one with which it begins.
@@ -59,7 +60,7 @@ const SIGN: u8 = 6;
 /// Why a constant cannot have this name, if it cannot.
 pub(in crate::scene) fn refused_name(name: &str) -> Option<&'static str> {
     let is_letter = |c: char| c.is_alphabetic() || c == '_';
-    let mut known = NAMES.iter().map(|(name, _)| *name).chain(TABLES);
+    let mut known = NAMES.iter().map(|(name, _)| *name).chain(TABLES.map(|(name, _)| name));
     let is_operator = OPERATORS.iter().any(|(symbol, ..)| *symbol == name);
     if is_operator || known.any(|known| known == name) {
         return Some("has a name that expressions use for something else; choose another one");
@@ -169,8 +170,8 @@ impl<'a> Parser<'a> {
     /// Parses a variable, π, a constant, or a function with its arguments.
     fn name(&mut self, name: &str) -> Parsed {
         self.at += name.len();
-        if TABLES.contains(&name) {
-            return self.table(name);
+        if let Some(table) = TABLES.into_iter().find(|(known, _)| *known == name) {
+            return self.table(table);
         }
         let known = NAMES.iter().find(|(known, _)| *known == name).map(|(_, known)| known.clone());
         let constant = self.scope.constants.get(name).and_then(Value::as_float);
@@ -180,7 +181,7 @@ impl<'a> Parser<'a> {
                 return Err(format!("has the constant `{name}` {WITHOUT_VALUE}"));
             }
             let kind = if self.peek() == Some('(') { "function" } else { "variable" };
-            let known = NAMES.iter().map(|(name, _)| *name).chain(TABLES);
+            let known = NAMES.iter().map(|(name, _)| *name).chain(TABLES.map(|(name, _)| name));
             let known = known.chain(self.scope.constants.keys().map(String::as_str));
             let suggestion = suggestion(name, &known.collect::<Vec<_>>());
             return Err(format!("has the unknown {kind} `{name}`{suggestion}"));
@@ -201,8 +202,8 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// Parses the rest of a `table` or `spline`: `("file")` or `("file", argument)`.
-    fn table(&mut self, name: &str) -> Parsed {
+    /// Parses the rest of a function of [`TABLES`]: `("file")` or `("file", argument)`.
+    fn table(&mut self, (name, shape): (&str, Shape)) -> Parsed {
         let usage = format!(
             "has a {name} without a file; write {name}(\"file.csv\"), of t, or {name}(\"file.csv\", x)"
         );
@@ -211,7 +212,7 @@ impl<'a> Parser<'a> {
         let file = quote.zip(rest).and_then(|(quote, rest)| rest.split_once(quote));
         let Some((file, _)) = file else { return Err(usage) };
         self.at += file.len() + 2;
-        let table = Table::read(&self.scope.folder.join(file), name == TABLES[1]);
+        let table = Table::read(&self.scope.folder.join(file), shape);
         let table = table.map_err(|error| format!("has {error}"))?;
         match self.take(",") {
             true => self.expression(1)?,

@@ -3,22 +3,34 @@
 use crate::{scene::document::absolute, whole_file};
 use std::path::Path;
 
-/// A function through points (a, f), piecewise linear or smooth, constant before the first and after the last point.
+/// The shape of a function between two points.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Shape {
+    /// A line.
+    Linear,
+    /// A cubic function; the second derivative is continuous.
+    Cubic,
+    /// A monotone cubic function; the derivative is continuous.
+    Monotone,
+}
+
+/// A function through points (a, f), constant before the first and after the last point.
 #[derive(Debug)]
 pub(super) struct Table {
     /// The points in the order of a. At a jump two points have the same a.
     points: Vec<[f64; 2]>,
-    /// The derivatives f' at the points, if the function is smooth; empty if it is piecewise linear.
+    shape: Shape,
+    /// The derivatives f' at the points; empty if the function is piecewise linear.
     slopes: Vec<f64>,
 }
 
 impl Table {
     /// Reads the points from the CSV file at `path`: a and f in each row. The first row may be a header.
-    /// Lines that begin with `#` are comments. The function between them is piecewise linear, or smooth.
+    /// Lines that begin with `#` are comments. The function between them has a `shape`.
     ///
     /// # Errors
     /// The file cannot be read, or a row has not two finite numbers or is not in order.
-    pub(super) fn read(path: &Path, is_smooth: bool) -> Result<Self, String> {
+    pub(super) fn read(path: &Path, shape: Shape) -> Result<Self, String> {
         let failed =
             |error: &dyn std::fmt::Display| format!("the table {}: {error}", path.display());
         if absolute(path).to_str().is_none() {
@@ -63,8 +75,9 @@ impl Table {
         match points.is_empty() {
             true => Err(failed(&"has no rows of numbers")),
             false => {
-                let pieces = points.chunk_by(|p, q| p[0] < q[0]).filter(|_| is_smooth);
-                Ok(Self { slopes: pieces.flat_map(slopes).collect(), points })
+                let pieces = points.chunk_by(|p, q| p[0] < q[0]);
+                let slopes = pieces.flat_map(|piece| slopes(piece, shape)).collect();
+                Ok(Self { shape, slopes, points })
             }
         }
     }
@@ -75,12 +88,23 @@ impl Table {
         match (&self.points[..next], &self.points[next..]) {
             _ if a.is_nan() => a,
             ([], [[_, f], ..]) | ([.., [_, f]], []) => *f,
-            ([.., [p, f]], [[q, g], ..]) => match self.slopes.get(next - 1..=next) {
-                None => f + (a - p) / (q - p) * (g - f),
-                Some(slopes) => cubic(a - p, q - p, [*f, *g], [slopes[0], slopes[1]]),
-            },
+            ([.., [p, f]], [[q, g], ..]) => {
+                let (y, rise) = ((a - p) / (q - p), g - f);
+                let [u, b, c] = self.cubic(next).unwrap_or([rise, 0.0, 0.0]);
+                let value = f + y * (u + y * (b + y * c));
+                // Rounding does not carry a monotone function beyond the values.
+                if self.shape == Shape::Cubic { value } else { value.clamp(f.min(*g), f.max(*g)) }
+            }
             ([], []) => f64::NAN,
         }
+    }
+
+    /// The coefficients of y, y² and y³ between the point before `next`, y = 0, and this one, y = 1.
+    fn cubic(&self, next: usize) -> Option<[f64; 3]> {
+        let [[p, f], [q, g]] = [self.points[next - 1], self.points[next]];
+        let slopes = self.slopes.get(next - 1..=next)?;
+        let ([u, v], rise) = ([slopes[0] * (q - p), slopes[1] * (q - p)], g - f);
+        Some([u, 3.0 * rise - 2.0 * u - v, u + v - 2.0 * rise])
     }
 
     /// Is it linear between more than two points?
@@ -88,48 +112,96 @@ impl Table {
         self.slopes.is_empty() && self.points.len() > 2
     }
 
-    /// Values whose range contains all f(a) in an interval: the values at its ends and at the points in it, as f is monotone
-    /// between two points.
+    /// Values whose range contains all f(a) in an interval: the values at its ends, at the points in it, and where a cubic
+    /// function turns between two points.
     pub(super) fn within(&self, [low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
         // At a jump at the lower end the value after it counts.
         let first = self.points.partition_point(|[a, _]| *a <= low);
         let inside = self.points[first..].iter().take_while(move |[a, _]| *a <= high);
-        [self.at(low), self.at(high)].into_iter().chain(inside.map(|[_, f]| *f))
+        let next = first.max(1)..=(first + inside.clone().count()).min(self.points.len() - 1);
+        let turns = next.filter(|_| self.shape == Shape::Cubic).flat_map(move |next| {
+            let [p, q] = [next - 1, next].map(|i| self.points[i][0]);
+            let turns = self.cubic(next).map_or([f64::NAN; 2], turning_points);
+            turns.map(|y| (0.0 < y && y < 1.0).then_some(p + y * (q - p)))
+        });
+        let turns = turns.flatten().filter(move |a| (low..=high).contains(a)).map(|a| self.at(a));
+        [self.at(low), self.at(high)].into_iter().chain(inside.map(|[_, f]| *f)).chain(turns)
     }
 }
 
-/// The slopes of the monotone piecewise cubic function through points of increasing a (Fritsch and Carlson, SIAM J. Numer.
-/// Anal. 17, 1980). With the lengths h and the secant slopes s of the two intervals at a point: f' = 0 if s₁s₂ ≤ 0, else
-/// (w₁ + w₂)/f' = w₁/s₁ + w₂/s₂, w₁ = h₁ + 2h₂, w₂ = 2h₁ + h₂ (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984). At an
-/// end f' = s₁ + h₁(s₁ − s₂)/(h₁ + h₂), with s₁, h₁ of the interval there, limited to between 0 and 3s₁ (Moler, Numerical
-/// Computing with MATLAB, 2004, 3.6).
-fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
+/// The zeros of the derivative u + 2by + 3cy² of a cubic function.
+fn turning_points([u, b, c]: [f64; 3]) -> [f64; 2] {
+    let q = -(b + b.signum() * (b * b - 3.0 * c * u).sqrt());
+    [q / (3.0 * c), u / q]
+}
+
+/// The slopes at points of increasing a; none of a piecewise linear function. At the ends, and at the middle of three points,
+/// `Cubic` functions have those of the parabola through three points: f' = s₁ + h₁(s₁ − s₂)/(h₁ + h₂), with the length h₁
+/// and the secant slope s₁ of the interval at the end.
+fn slopes(points: &[[f64; 2]], shape: Shape) -> Vec<f64> {
     let secant = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]);
     let secants = points.windows(2).map(secant).map(|(h, rise)| [h, rise / h]);
     let secants: Vec<[f64; 2]> = secants.collect();
-    let inner = |pair: &[[f64; 2]]| {
-        let [[h1, s1], [h2, s2]] = [pair[0], pair[1]];
-        let [w1, w2] = [h1 + 2.0 * h2, 2.0 * h1 + h2];
-        if s1 * s2 > 0.0 { (w1 + w2) / (w1 / s1 + w2 / s2) } else { 0.0 }
-    };
-    let end = |[h1, s1]: [f64; 2], [h2, s2]: [f64; 2]| {
-        let slope = s1 + h1 / (h1 + h2) * (s1 - s2);
-        slope.clamp((3.0 * s1).min(0.0), (3.0 * s1).max(0.0))
-    };
-    let (Some(&first), Some(&last)) = (secants.first(), secants.last()) else { return vec![0.0] };
-    // Of one interval, its own secant: the function is a line.
-    let second = *secants.get(1).unwrap_or(&first);
-    let before = *secants.iter().rev().nth(1).unwrap_or(&last);
-    let inner = secants.windows(2).map(inner);
-    [end(first, second)].into_iter().chain(inner).chain([end(last, before)]).collect()
+    let end = |[h1, s1]: [f64; 2], [h2, s2]: [f64; 2]| s1 + h1 / (h1 + h2) * (s1 - s2);
+    match (shape, &secants[..]) {
+        (Shape::Linear, _) => Vec::new(),
+        (_, []) => vec![0.0],
+        (_, &[[_, s]]) => vec![s, s],
+        (Shape::Cubic, &[a, b]) => {
+            vec![end(a, b), (b[0] * a[1] + a[0] * b[1]) / (a[0] + b[0]), end(b, a)]
+        }
+        (Shape::Cubic, _) => twice_differentiable(&secants),
+        // Limited to between 0 and 3s₁ (Moler, Numerical Computing with MATLAB, 2004, 3.6).
+        (Shape::Monotone, [first, second, ..]) => {
+            let limited =
+                |a: [f64; 2], b| end(a, b).clamp((3.0 * a[1]).min(0.0), (3.0 * a[1]).max(0.0));
+            let [.., before, last] = &secants[..] else { unreachable!("two intervals") };
+            let mut slopes = vec![limited(*first, *second)];
+            slopes.extend(secants.windows(2).map(|pair| monotone(pair[0], pair[1])));
+            slopes.push(limited(*last, *before));
+            slopes
+        }
+    }
 }
 
-/// The cubic function at the distance z from the first end of an interval of length h, by its values and slopes at both ends.
-/// Rounding does not carry it beyond the values.
-fn cubic(z: f64, h: f64, [f, g]: [f64; 2], [u, v]: [f64; 2]) -> f64 {
-    let s = (g - f) / h;
-    let value = f + z * (u + z / h * (3.0 * s - 2.0 * u - v + z / h * (u + v - 2.0 * s)));
-    value.clamp(f.min(g), f.max(g))
+/// The slope at a point of a monotone piecewise cubic function (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980): 0 if the
+/// secant slopes of the two intervals have different signs, else (w₁ + w₂)/f' = w₁/s₁ + w₂/s₂, w₁ = h₁ + 2h₂, w₂ = 2h₁ + h₂
+/// (Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5, 1984).
+fn monotone([h1, s1]: [f64; 2], [h2, s2]: [f64; 2]) -> f64 {
+    let [w1, w2] = [h1 + 2.0 * h2, 2.0 * h1 + h2];
+    if s1 * s2 > 0.0 { (w1 + w2) / (w1 / s1 + w2 / s2) } else { 0.0 }
+}
+
+/// The slopes f'_i of a cubic spline (de Boor, A Practical Guide to Splines, 1978, ch. IV), by elimination in
+///
+/// h₂ f'_{i−1} + 2(h₁ + h₂) f'_i + h₁ f'_{i+1} = 3(h₂s₁ + h₁s₂);
+///
+/// the first and last two intervals have one cubic function ("not-a-knot"): h₂ f'_0 + (h₁ + h₂) f'_1 = r.
+fn twice_differentiable(secants: &[[f64; 2]]) -> Vec<f64> {
+    let right = |[h1, s1]: [f64; 2], [h2, s2]: [f64; 2]| {
+        ((3.0 * h1 + 2.0 * h2) * h2 * s1 + h1 * h1 * s2) / (h1 + h2)
+    };
+    let (first, last) = ([secants[0], secants[1]], secants.len() - 1);
+    let last = [secants[last], secants[last - 1]];
+    // Below the diagonal, on it, above it, and the right-hand side.
+    let mut rows = vec![[0.0, first[1][0], first[0][0] + first[1][0], right(first[0], first[1])]];
+    rows.extend(secants.windows(2).map(|pair| {
+        let ([h1, s1], [h2, s2]) = (pair[0], pair[1]);
+        [h2, 2.0 * (h1 + h2), h1, 3.0 * (h2 * s1 + h1 * s2)]
+    }));
+    rows.push([last[0][0] + last[1][0], last[1][0], 0.0, right(last[0], last[1])]);
+    for i in 1..rows.len() {
+        let ([_, diagonal, above, r], below) = (rows[i - 1], rows[i][0]);
+        let factor = below / diagonal;
+        rows[i][1] -= factor * above;
+        rows[i][3] -= factor * r;
+    }
+    let mut slopes = vec![0.0; rows.len() + 1];
+    for (i, [_, diagonal, above, r]) in rows.into_iter().enumerate().rev() {
+        slopes[i] = (r - above * slopes[i + 1]) / diagonal;
+    }
+    slopes.pop();
+    slopes
 }
 
 /// Whether a row begins like a number. Then it is a wrong row and not a header.
