@@ -21,6 +21,10 @@ PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-co
 PACKAGES_TEST := procps python3-scipy python3-pandas python3-nbclient python3-ipykernel python3-tqdm
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
+# GetFEM; the others are wheels in .venv-peers. scikit-sparse is CHOLMOD for scikit-fem, built from its source; from 0.5 on
+# it needs a newer SuiteSparse than that of Debian 12.
+PACKAGES_PEERS := python3-getfem python3-venv python3-dev
+WHEELS_PEERS := ngsolve scikit-fem 'scikit-sparse<0.5'
 # dpkg-shlibdeps finds the packages of the libraries.
 PACKAGES_DEB := dpkg-dev
 
@@ -32,7 +36,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-test deps-validate deps-random build deb mesh run figures keys test validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run figures keys test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook \
     constants architecture fuzz systems clean
 
@@ -50,7 +54,7 @@ help:
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
-	@echo 'make bench      speed against FEniCSx, growth; or ARGS=--quick'
+	@echo 'make bench      speed against FEniCSx and others (make deps-peers), growth; or ARGS=--quick'
 	@echo 'make stability  the maps of where methods fail; or MAPS="step-size …"'
 	@echo 'make reference  the reference solution of a scene, unless it is there (minutes); or STUDY=geo/a.toml'
 	@echo 'make converge   errors against it on nested meshes: Table 1, Figure 3; or STUDY=geo/a.toml'
@@ -76,6 +80,12 @@ deps-validate: deps
 
 deps-random: deps
 	@scripts/deps.sh $(PACKAGES_RANDOM)
+
+# The programs beside which `make bench` and `make chart` measure; without them they are left out.
+deps-peers: deps
+	@scripts/deps.sh $(PACKAGES_PEERS)
+	$(PYTHON) -m venv .venv-peers
+	.venv-peers/bin/pip install --quiet $(WHEELS_PEERS)
 
 # After `cargo fetch` the other targets need no network.
 build: deps
@@ -138,7 +148,7 @@ compare: build
 	@$(BINARY) compare $(SCENE) $(ARGS)
 
 # Side by side on this machine: `make bench ARGS=--quick` for small meshes, one round.
-bench: build deps-validate
+bench: build deps-validate deps-random
 	$(PYTHON) validation/bench.py --binary $(BINARY) $(ARGS)
 
 stability: build
@@ -155,7 +165,7 @@ paper: build
 	$(PYTHON) validation/paper.py --binary $(BINARY) $(ARGS)
 
 # Whole processes against references of their own, which are kept (minutes); out/chart/chart.png.
-chart: build deps-validate
+chart: build deps-validate deps-random
 	$(PYTHON) validation/chart.py --binary $(BINARY) $(ARGS) $(CHART)
 
 accuracy: build

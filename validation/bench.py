@@ -12,6 +12,10 @@ growth   time per step and peak memory up to two million unknowns
 ranks    whole runs on 1, 2 and 4 ranks with our factors (one rank: growth), with MUMPS and with PETSc's
          multigrid (gamg), these two on 4 ranks alone where the mesh is largest
 
+peers    the same work in NGSolve, scikit-fem and GetFEM (peers.py): a static contact problem, whole processes and the
+         contact solve alone, and 10 steps with damage. Whole processes include the imports of Python. Ours reads the
+         mesh and writes its results; the peers get arrays and write nothing
+
 k = 0.01. A step is the mean of all but the first, which makes what the others keep. Programs take turns,
 because the machine may be shared: a row has the medians over the rounds, ratios are taken round by round.
 All use the same meshes, tolerance and one thread each. A program whose answer differs from ours by more than 1e-6
@@ -32,7 +36,9 @@ from statistics import median
 import numpy as np
 
 from shared import ROOT, parser_of
+from peers import PEERS, answer, command, installed, write_problem
 from results import markdown, read_table, write_table
+from scene import read_scene, write_scene
 
 # The largest allowed difference of an answer from ours to the same discrete problem, and the largest KKT residual.
 SAME, TOLERANCE = 1e-6, 1e-10
@@ -112,21 +118,22 @@ class Bench:
 
     def signorini(self, scene, mesh, order, steps=STEPS, ranks=1, frames=True, petsc=()):
         """A run with about 20 frames by default: its row, its history, and the seconds per call of each phase of
-        `--profile`."""
+        `--profile`. Without steps the scene is static, and its step is the contact solve."""
         folder = self.out / "run"
+        times = ["--set", "time.step=0.01", "--set", f"time.end={steps / 100}"] if steps else []
         launcher = ["mpiexec", "--allow-run-as-root", "--oversubscribe", "-n", ranks] if ranks != 1 else []
         said, whole = self.start([
             *launcher, self.binary, "run", ROOT / "geo" / f"{scene}.toml", "--mesh", mesh, "--out", folder,
-            "--set", "time.step=0.01", "--set", f"time.end={steps / 100}", "--profile",
-            "--set", f"discretisation.displacement={order}",
+            *times, "--profile", "--set", f"discretisation.displacement={order}",
             *([] if frames else ["--set", "output.every=100000"]), "--", *petsc])
         summary = json.loads((folder / "summary.json").read_text())
         history = read_table(folder / "history.csv")
         # The first step also makes the factor and other data that all steps use.
-        mean = lambda key: sum(row[key] for row in history[2:]) / len(history[2:])
+        mean = lambda key: float(np.mean([row[key] for row in history[2:] or history]))
         phases = dict(re.findall(r"^ +([A-Za-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
-        row = {"nodes": summary["nodes"], "seconds_per_step": mean("seconds"), "whole_seconds": whole,
-               "solves": mean("linear_iterations"), "factorisations": mean("factorisations"),
+        contact = 1e-3 * float(phases["contact"])
+        row = {"nodes": summary["nodes"], "seconds_per_step": mean("seconds") if steps else contact,
+               "whole_seconds": whole, "solves": mean("linear_iterations"), "factorisations": mean("factorisations"),
                "kkt": max(summary["kkt"].values()), "peak_mb": summary["peak_megabytes"]}
         return row, history, {name: 1e-3 * float(ms) for name, ms in phases.items()}
 
@@ -144,6 +151,13 @@ class Bench:
                 "factorisations": last["factorisations"] / (steps - 1), "kkt": last["kkt"],
                 "peak_mb": last["peak_mb"]}, last
 
+    def peer(self, program, path):
+        """Runs a peer; returns its row and its last state. A step is the mean of all but the first."""
+        said, whole = self.start(command(program, path))
+        last = answer(said)
+        return {"version": last["program"], "whole_seconds": whole,
+                "seconds_per_step": float(np.mean(last["seconds"][2:])) if last["steps"] else last["solve"]}, last
+
     def keep(self, part, row):
         self.rows.append({"part": part, **row, **self.speeds})
         words = " ".join(f"{row[key]}" for key in ("contact", "order", "mesh", "n", "ranks", "program") if key in row)
@@ -152,7 +166,7 @@ class Bench:
 
 def differs(last, history, row):
     """The reason why the times of a program do not count, or None: all programs must solve the same problem."""
-    if row["kkt"] > TOLERANCE:
+    if row.get("kkt", 0.0) > TOLERANCE:
         return f"KKT {row['kkt']:.1e}"
     for key in ("zeta_min", "displacement_max", "work"):
         apart = abs(last[key] - history[last["steps"]][key]) / max(abs(step[key]) for step in history)
@@ -229,6 +243,38 @@ def ranks(bench, quick):
                     print(f"left out: {program} on {count} ranks: {wrong}", file=sys.stderr)
                 else:
                     bench.keep("ranks", {"n": n, "ranks": count, "program": program, **row})
+
+
+def beside_peers(bench, quick):
+    """What users would pick instead: a static problem whose contact has to be found (the foundation is flat, the square
+    is pulled and pressed down), and steps of `square-mild`."""
+    programs = [OURS, *installed()]
+    scene = {key: value for key, value in read_scene(ROOT / "geo" / "square-mild.toml").items()
+             if key not in ("damage", "time")}
+    scene["boundary"] = [{**of, "traction": ["1", "-1"]} if "traction" in of else of for of in scene["boundary"]]
+    for n in (64,) if quick else (64, 128, 256):
+        mesh = bench.mesh("", "square", n)
+        write_scene({**scene, "mesh": {"file": str(mesh)}}, bench.out / "static.toml")
+        for work, name, steps in (("static", bench.out / "static", 0), ("damage", "square-mild", SHORT)):
+            write_problem(bench.out / "problem.npz", ROOT / "geo" / f"{name}.toml", mesh, steps)
+            found = {program: [] for program in programs}
+            for program in programs * (1 if quick else 3):
+                try:
+                    if program == OURS:
+                        row, history, _ = ours = bench.signorini(name, mesh, 1, steps)
+                    else:
+                        row, last = bench.peer(program, bench.out / "problem.npz")
+                        if wrong := differs(last, history, row):
+                            raise Failure(wrong)
+                    found[program].append({**row, **{
+                        f"{key}_over_ours": row[key] / ours[0][key] for key in ("seconds_per_step", "whole_seconds")}})
+                except Failure as failure:
+                    print(f"left out: {work}, n = {n}, {program}: {failure}", file=sys.stderr)
+            for program, runs in found.items():
+                if runs:
+                    row = {key: of if isinstance(of, str) else median(run[key] for run in runs)
+                           for key, of in runs[0].items()}
+                    bench.keep("peers", {"contact": work, "n": n, "program": program, **row})
 
 
 def machine():
@@ -317,7 +363,19 @@ def report(rows):
         print(f"Milliseconds of a pass, ours / floor: {ours['copy'] / 1e9:.1f} GB/s, {ours['dgemm'] / 1e9:.1f} Gflop/s "
               f"({ours['dgemm as installed'] / 1e9:.1f} with the BLAS as it is installed)\n")
         print(markdown([*head, *PASSES, "factorisation"], passes), end="\n\n")
-    others = sorted((row for row in rows if row["part"] != "compare"),
+    works = {}
+    for row in rows:
+        if row["part"] == "peers":
+            works.setdefault((row["contact"], row["n"]), {})[row["program"]] = row
+    lines = [[*name, round(work[OURS]["nodes"]), number(work[OURS]["seconds_per_step"], 1e3),
+              number(work[OURS]["whole_seconds"]),
+              *(" / ".join(times(work, peer, key) for key in ("seconds_per_step", "whole_seconds")) for peer in PEERS)]
+             for name, work in works.items()]
+    if works:
+        print(markdown(["work", "n", "nodes", "ms per step", "whole, s", *(f"× {peer}" for peer in PEERS)], lines))
+        print("\n" + "; ".join(sorted({row["version"] for work in works.values() for row in work.values()
+                                      if "version" in row})), end="\n\n")
+    others = sorted((row for row in rows if row["part"] in ("growth", "ranks")),
                     key=lambda row: (row["n"], row["program"], row["ranks"]))
     lines = [[row["n"], row["program"], row["ranks"], number(row["seconds_per_step"], 1e3), number(row["solves"]),
               number(row["whole_seconds"]), number(row["whole_seconds"] - SHORT * row["seconds_per_step"]),
@@ -330,7 +388,7 @@ def report(rows):
 
 
 def main():
-    parts = {"compare": compare, "growth": growth, "ranks": ranks}
+    parts = {"compare": compare, "peers": beside_peers, "growth": growth, "ranks": ranks}
     parser = parser_of(__doc__, "bench")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(parts)}")
     parser.add_argument("--quick", action="store_true", help="small meshes, one round")

@@ -2,11 +2,12 @@
 """Error against seconds, whole processes: chart.py [--binary FILE] [--asked] [--quick] SCENE…
 
 The runs of a scene are: P1 on uniform meshes with uniform steps by the paper's method, `penalty-duality:plain`, by the
-other contact solvers and in FEniCSx; meshes graded by the .geo in P1 and P2; `--accuracy` from 0.1 to 0.001; and the
-scene as it is. The time is that of the processor for the whole process on one core, with gmsh, adaptation and output;
-FEniCSx gets the mesh. For a run below three seconds it is the median of three runs. The error is the larger one of the
-relative errors of u (energy norm) and of the damage (L²) at the end, against the reference of references.py.
-FEniCSx solves the same discrete problem: it has our error, if the work of its loads agrees to 1e-6.
+other contact solvers, in FEniCSx, and in NGSolve, scikit-fem and GetFEM if they are there (`make deps-peers`); meshes
+graded by the .geo in P1 and P2; `--accuracy` from 0.1 to 0.001; and the scene as it is. The time is that of the
+processor for the whole process on one core, with gmsh, adaptation and output; FEniCSx gets the mesh, the peers get
+arrays and write nothing. For a run below three seconds it is the median of three runs. The error is the larger one of
+the relative errors of u (energy norm) and of the damage (L²) at the end, against the reference of references.py. The
+other programs solve the same discrete problem: they have our error, if the work of their loads agrees to 1e-6.
 
 Writes out/chart/<scene>/chart.csv and draws out/chart/chart.png, a panel per scene (beside scenes that are not of this
 repository). Prints the Pareto front
@@ -18,7 +19,6 @@ exit code 1 if the larger one exceeds it. (`make promises` checks the error of e
 """
 
 import itertools
-import json
 import os
 import shutil
 import subprocess
@@ -34,6 +34,7 @@ import references
 from shared import ROOT, out_of, parser_of
 from converge import finish
 from drawing import BLUE, GREEN, INK, RED, plt
+from peers import PEERS, answer, command, installed, write_problem
 from results import write_table
 from scene import SceneError, read_scene, write_scene
 from true_errors import Run, errors
@@ -57,6 +58,8 @@ KINDS = [
     ("P1, uniform: penalty-duality", "P1 uniform", "penalty-duality", "#d08a1d", "^"),
     ("P1, uniform: the paper's method", "P1 uniform", PLAIN, INK, "X"),
     ("P1, uniform: FEniCSx", "P1 uniform", FENICSX, "#8e5aa8", "P"),
+    *((f"P1, uniform: {peer}", "P1 uniform", peer, colour, marker) for peer, colour, marker in zip(
+        PEERS, ("#c2185b", "#00838f", "#9e9d24"), ("h", "d", "8"))),
     ("P1, graded mesh: active-set", "P1 graded", "active-set", "#4fa3a5", "v"),
     ("P2, graded mesh: active-set", "P2 graded", "active-set", "#7a6a3a", "<"),
     ("--accuracy: active-set", "accuracy", "active-set", RED, "D"),
@@ -103,7 +106,7 @@ class Choice:
         return ", ".join(parts + [self.solver] * (self.solver != "active-set"))
 
 
-def choices(study, quick):
+def choices(study, quick, peers):
     """The runs of a scene; a third of them if it has to be quick."""
     end, file = study.shipped.get("time", {}).get("end"), study.folder / study.shipped["mesh"]["file"]
     extent = float(np.ptp(study.reference.points, axis=0).max())
@@ -117,8 +120,9 @@ def choices(study, quick):
         # Small steps where they are cheap.
         if not end or k >= step or size >= largest / 4:
             yield Choice("P1 uniform", order=1, size=size, step=k)
-        if end and k == step and size in sizes[:few]:
-            yield Choice("P1 uniform", FENICSX, order=1, size=size, step=k)
+        if k == step and size in sizes[:few]:
+            for solver in [FENICSX] * bool(end) + peers:
+                yield Choice("P1 uniform", solver, order=1, size=size, step=k)
     for solver, size in itertools.product((PLAIN, "tao", "penalty-duality"), sizes[:few]):
         yield Choice("P1 uniform", solver, order=1, size=size, step=step)
     for size in sizes[:few + 1] * is_graded:
@@ -147,7 +151,7 @@ class Study:
         """Adds the row of a run, or reports why it failed."""
         try:
             write_scene(choice.scene(self.shipped), self.folder / f"{self.name}.toml")
-            row = self.in_fenicsx(choice) if choice.solver == FENICSX else self.by_us(choice)
+            row = self.elsewhere(choice) if choice.solver in (FENICSX, *PEERS) else self.by_us(choice)
         except SceneError as error:
             print(f"{self.name}, {choice}: {error}", file=sys.stderr, flush=True)
             return
@@ -166,18 +170,23 @@ class Study:
                 "accuracy": choice.accuracy, "nodes": run.summary["nodes"], "steps": run.summary["steps"],
                 "seconds": seconds, "u": u, "damage": damage, "error": max(u, damage)}
 
-    def in_fenicsx(self, choice):
-        """The row of FEniCSx on the mesh of the last run, which has solved the same discrete problem."""
-        mesh, steps = next(self.folder.glob("*.msh")), round(self.shipped["time"]["end"] / choice.step)
-        command = [sys.executable, ROOT / "validation" / "fenicsx.py", self.folder / f"{self.name}.toml", mesh,
-                   "--keep", 7, "--out", self.folder / "loop"]
-        # This compiles the forms.
-        self.timed([*command, "--steps", 1])
-        seconds, said = self.timed([*command, "--steps", steps])
-        ours, theirs = self.last.figures["work"]["value"], json.loads(said.strip().splitlines()[-1])["work"]
+    def elsewhere(self, choice):
+        """The row of another program on the mesh of the last run, which has solved the same discrete problem."""
+        scene, mesh = self.folder / f"{self.name}.toml", next(self.folder.glob("*.msh"))
+        steps = round(self.shipped["time"]["end"] / choice.step) if choice.step else 0
+        if choice.solver == FENICSX:
+            fenicsx = [sys.executable, ROOT / "validation" / "fenicsx.py", scene, mesh, "--keep", 7,
+                       "--out", self.folder / "loop"]
+            # This compiles the forms.
+            self.timed([*fenicsx, "--steps", 1])
+            seconds, said = self.timed([*fenicsx, "--steps", steps])
+        else:
+            write_problem(self.folder / "problem.npz", scene, mesh, steps)
+            seconds, said = self.timed(command(choice.solver, self.folder / "problem.npz"))
+        ours, theirs = self.last.figures["work"]["value"], answer(said)["work"]
         if abs(theirs - ours) > 1e-6 * abs(ours):
             raise SceneError(f"the work of the loads is {theirs}, but {ours} by signorini: another answer")
-        return {**self.rows[-1], "run": str(choice), "solver": FENICSX, "seconds": seconds}
+        return {**self.rows[-1], "run": str(choice), "solver": choice.solver, "seconds": seconds}
 
     def timed(self, command, meshes=lambda _: ()):
         """The median seconds of a command, each time without the listed meshes, and its output."""
@@ -274,6 +283,7 @@ def main():
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
     arguments = parser.parse_args()
     tables, out, failed = {}, out_of(arguments.scenes[0]) / "chart", False
+    peers = [] if arguments.asked else installed()
     for path in arguments.scenes:
         with tempfile.TemporaryDirectory() as folder:
             try:
@@ -283,7 +293,7 @@ def main():
                 print(f"error: {error}", file=sys.stderr)
                 continue
             asked = (Choice("accuracy", accuracy=accuracy) for accuracy in ASKED)
-            for choice in asked if arguments.asked else choices(study, arguments.quick):
+            for choice in asked if arguments.asked else choices(study, arguments.quick, peers):
                 study.run(choice)
             tables[study.name], made = study.rows, study.last.summary["provenance"]
         if not arguments.asked:
