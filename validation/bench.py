@@ -131,9 +131,9 @@ class Bench:
         # The first step also makes the factor and other data that all steps use.
         mean = lambda key: float(np.mean([row[key] for row in history[2:] or history]))
         phases = dict(re.findall(r"^ +([A-Za-z ]+?) +\d+ +[\d.]+ +[\d.]+ % +([\d.]+)", said, re.MULTILINE))
-        contact = 1e-3 * float(phases["contact"])
-        row = {"nodes": summary["nodes"], "seconds_per_step": mean("seconds") if steps else contact,
-               "whole_seconds": whole, "solves": mean("linear_iterations"), "factorisations": mean("factorisations"),
+        row = {"nodes": summary["nodes"], "whole_seconds": whole,
+               "seconds_per_step": mean("seconds") if steps else 1e-3 * float(phases["contact"]),
+               "solves": mean("linear_iterations"), "factorisations": mean("factorisations"),
                "kkt": max(summary["kkt"].values()), "peak_mb": summary["peak_megabytes"]}
         return row, history, {name: 1e-3 * float(ms) for name, ms in phases.items()}
 
@@ -372,7 +372,7 @@ def report(rows):
               *(" / ".join(times(work, peer, key) for key in ("seconds_per_step", "whole_seconds")) for peer in PEERS)]
              for name, work in works.items()]
     if works:
-        print(markdown(["work", "n", "nodes", "ms per step", "whole, s", *(f"× {peer}" for peer in PEERS)], lines))
+        print(markdown(["work", "n", "nodes", "ms", "whole, s", *(f"× {peer}" for peer in PEERS)], lines))
         print("\n" + "; ".join(sorted({row["version"] for work in works.values() for row in work.values()
                                       if "version" in row})), end="\n\n")
     others = sorted((row for row in rows if row["part"] in ("growth", "ranks")),

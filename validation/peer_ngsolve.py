@@ -1,8 +1,8 @@
 """The problem of peers.py in NGSolve: peer_ngsolve.py FILE.
 
-Prescribed and active unknowns are cleared in the BitArray of the free ones. NGSolve's own sparse Cholesky factor solves
-the systems. While the active set stays, it is kept as a preconditioner for conjugate gradients, until these need more
-than KEEP iterations.
+Prescribed and active unknowns are cleared in the BitArray of the free ones. UMFPACK solves the systems, on one thread
+the fastest of NGSolve's direct solvers here. While the active set stays, its factor is kept as a preconditioner for
+conjugate gradients, until these need more than KEEP iterations.
 """
 
 import ngsolve
@@ -64,7 +64,7 @@ def solve(x, f, prescribed):
         free.Set()
         for k in prescribed:
             free.Clear(int(k))
-        kept["prescribed"], kept["factor"] = prescribed, K.mat.Inverse(free, inverse="sparsecholesky")
+        kept["prescribed"], kept["factor"] = prescribed, K.mat.Inverse(free, inverse="umfpack")
         r.data = loads - K.mat * solution.vec
         solution.vec.data += kept["factor"] * r
     r.data = K.mat * solution.vec - loads

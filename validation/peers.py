@@ -66,7 +66,8 @@ def write_problem(path, scene, mesh, steps):
     (fixed, _), (contact, sign) = unknowns(prescribed[0]), unknowns(rows[0])
     free = ~np.isin(contact, fixed)
     law = {**dict.fromkeys(DAMAGE_KEYS, 0.0), **DAMAGE, **scene.get("damage", {})}
-    if law["mass"] != "consistent" or float(law["initial"]) != 1.0 or isinstance(law["diffusion"], dict):
+    if law["mass"] != "consistent" or str(law["initial"]) not in ("1", "1.0") or any(
+            isinstance(law[key], dict) for key in DAMAGE_KEYS):
         raise SceneError("the peers know one law of damage, its consistent mass, and ζ = 1 at the start")
     stiffness = discrete.d.reshape(-1, 3, 3)
     if np.ptp(stiffness, axis=0).max() > ZERO * stiffness.max():
