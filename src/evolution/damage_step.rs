@@ -135,43 +135,39 @@ impl DamageStep<'_> {
         Ok(DamageUpdate { zeta, min_max, certificate: Some(certificate) })
     }
 
-    /// (M + kκL)⁻¹ k b: the change of ζ_n in a planned step if its source load changes by b = `load`, m²/s.
-    ///
-    /// # Errors
-    /// The system has no finite solution.
+    /// (M + kκL)⁻¹ k b: the change of ζ_n in a planned step if its source load changes by b = `load`, m²/s. `None` if the
+    /// system has no finite solution. Collective.
     pub(crate) fn correction(
         &mut self,
         planned: &PlannedStep,
-        load: DVector<f64>,
-    ) -> Result<DVector<f64>, RunError> {
+        load: &[f64],
+    ) -> Result<Option<DVector<f64>>, RunError> {
         let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
-        if self.is_zero(load.as_slice()) {
-            return Ok(DVector::zeros(load.len()));
+        if self.is_zero(load) {
+            return Ok(Some(DVector::zeros(planned.start.len())));
         }
         let system = self.system(planned.k)?;
-        let solved = phases.time("damage solve", || system.correction(load.as_slice()))?;
-        let failed = || planned.failed(StepFailure::Damage);
-        let change = partition.field(solved.ok_or_else(failed)?, 1)?;
+        let Some(change) = phases.time("damage solve", || system.correction(load))? else {
+            return Ok(None);
+        };
+        let change = partition.field(change, 1)?;
         let finite = partition.comm().all(change.iter().all(|z| z.is_finite()));
-        if finite { Ok(DVector::from_vec(change)) } else { Err(failed()) }
+        Ok(finite.then(|| DVector::from_vec(change)))
     }
 
-    /// Lets an error δ = `error` of ζ_{n−1} diffuse for a planned step of length k_n: δ becomes δ + (k_n/k)
-    /// ((M + kκL)⁻¹ M δ − δ). It is unchanged if the solve fails. Collective.
+    /// Lets an error δ = `error` of ζ_{n−1} diffuse for a planned step of length k_n: δ becomes δ − (k_n/k)
+    /// (M + kκL)⁻¹ kκLδ. It is unchanged if the solve fails. Collective.
     pub(crate) fn diffuse(
         &mut self,
         planned: &PlannedStep,
         error: &mut DVector<f64>,
     ) -> Result<(), RunError> {
-        let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
         if self.is_zero(error.as_slice()) {
             return Ok(());
         }
-        let (mut left, no_source) = (error.clone(), vec![0.0; error.len()]);
-        let system = self.system(planned.k)?;
-        if phases.time("damage solve", || system.advance(&no_source, left.as_mut_slice()))? {
-            partition.update(left.as_mut_slice(), 1)?;
-            *error += planned.length / planned.k * (left - &*error);
+        let load = self.system(planned.k)?.diffusion_load(error.as_slice())?;
+        if let Some(change) = self.correction(planned, &load)? {
+            *error += planned.length / planned.k * change;
         }
         Ok(())
     }

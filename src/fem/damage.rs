@@ -257,9 +257,19 @@ impl DamageSystem {
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r = step * b))?;
         self.unknown.write(|x| x.fill(0.0))?;
         let size = self.rhs.norm()?;
-        // Some digits of a correction are enough.
+        // Some digits of a correction or of an estimated error are enough.
         let solved = size < NEGLIGIBLE_LOAD || self.solve(1e-6 * size)?;
         let correction = self.unknown.read(<[f64]>::to_vec)?;
         Ok(solved.then_some(correction))
+    }
+
+    /// −κLδ, m²/s, at the owned nodes: the source load of the diffusion of δ = `field`.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn diffusion_load(&mut self, field: &[f64]) -> Result<Vec<f64>, PetscError> {
+        self.unknown.set(&field[..self.unknown.owned()])?;
+        self.laplace.multiply(&self.unknown, &mut self.rhs)?;
+        self.rhs.read(|flow| flow.iter().map(|flow| -self.diffusion * flow).collect())
     }
 }

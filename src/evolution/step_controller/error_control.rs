@@ -53,7 +53,7 @@ pub const AIM: f64 = 0.7;
 /// The error of one step may be this fraction of the error that the steps before have left.
 ///
 /// Tuned on the 13 adapted runs. Half: 19 % more steps. Twice: 9 % fewer.
-const STEP_SHARE: f64 = 0.25;
+const STEP_SHARE: f64 = 0.5;
 /// The error that the steps before have left counts as at least this fraction of the aim: they may have used it up.
 ///
 /// Tuned on the 13 adapted runs. Half: `square` takes 22 steps for 20. Twice: `square` takes 18 steps and a fifth
@@ -70,7 +70,7 @@ impl<'a> ErrorControl<'a> {
         let grid = problem.scene().time?;
         let Stepping::Auto { tolerance, expected } = grid.stepping else { return None };
         // The error of the first step is at most half of its damage at its last rate, which lasts for the run.
-        let first_length = (2.0 * STEP_SHARE * tolerance).min(LONGEST_STEP) * grid.end;
+        let first_length = on_ladder(2.0 * STEP_SHARE * tolerance * grid.end, grid.end);
         let load_curve = LoadCurve::new(problem);
         Some(Self {
             body: &problem.body,
@@ -132,9 +132,9 @@ impl<'a> ErrorControl<'a> {
         }
     }
 
-    /// Makes the next step `length` s long; false if that is so short that the run has failed.
+    /// Makes the next step at most `length` s long; false if that is so short that the run has failed.
     pub(super) fn shorten(&mut self, length: f64) -> bool {
-        self.next_length = length;
+        self.next_length = on_ladder(length, self.end);
         length > ROUNDING * self.end
     }
 
@@ -161,7 +161,7 @@ impl<'a> ErrorControl<'a> {
     ) -> Result<(), f64> {
         let damage = self.norms(&(zeta - &self.initial));
         let [error, added, rates] = [error, added, rate].map(|field| self.norms(field));
-        let ahead = self.forecast.time_ahead(self.load_curve.as_ref(), planned.time);
+        let ahead = self.forecast.time_ahead(planned.time);
         let ratio = |j: usize| {
             let forecast = (ahead * rates[j]).clamp(NEGLIGIBLE_DAMAGE, MAX_FORECAST);
             let reference = match self.expected[j] {
@@ -173,13 +173,13 @@ impl<'a> ErrorControl<'a> {
         };
         let ratio = ratio(0).max(ratio(1));
         if ratio > 1.0 && self.next_length < f64::INFINITY {
-            return Err(growth(ratio).clamp(0.2, 0.9));
+            return Err(growth(ratio).max(0.2));
         }
         self.damage = damage;
         let is_followed = |pair: &[f64]| pair[0] == planned.time;
         self.next_length = match self.followed.windows(2).any(is_followed) {
             true => f64::INFINITY,
-            false => (planned.length * growth(ratio).min(2.0)).min(LONGEST_STEP * self.end),
+            false => on_ladder(planned.length * growth(ratio).min(2.0), self.end),
         };
         Ok(())
     }
@@ -208,8 +208,15 @@ impl<'a> ErrorControl<'a> {
 }
 
 /// The factor 0.9 (error/allowed error)^(−1/3) from the length of a step to the next. The error of a step is of
-/// third order in its length; 0.9 is a margin. The factor is cut to 32nds: rounding, which differs with ranks and
-/// units, then hardly ever changes steps.
+/// third order in its length; 0.9 is a margin.
 fn growth(error_ratio: f64) -> f64 {
-    (32.0 * 0.9 / error_ratio.max(1e-300).cbrt()).floor() / 32.0
+    0.9 / error_ratio.cbrt()
+}
+
+/// The largest of the lengths `LONGEST_STEP` T/2^j, j ≥ 0, that is at most `length`, s, for T = `end`. With few lengths a
+/// factor of the damage system serves many steps, and rounding, which differs with ranks and units, hardly ever changes
+/// steps.
+fn on_ladder(length: f64, end: f64) -> f64 {
+    let longest = LONGEST_STEP * end;
+    longest * (length / longest).log2().floor().min(0.0).exp2()
 }

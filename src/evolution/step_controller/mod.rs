@@ -176,10 +176,9 @@ impl<'a> StepController<'a> {
         damage_step: &mut DamageStep,
     ) -> Result<Decision, RunError> {
         let source = damage_step.source(planned.n, &step.state)?;
-        let correction = match self.two_step {
-            true => damage_step.correction(planned, &source.load - &planned.load)?,
-            false => DVector::zeros(damage.zeta.len()),
-        };
+        let missing = if self.two_step { &source.load - &planned.load } else { DVector::zeros(0) };
+        let correction = damage_step.correction(planned, missing.as_slice())?;
+        let correction = correction.ok_or_else(|| planned.failed(StepFailure::Damage))?;
         let corrected = &damage.zeta + &correction;
         let rate = planned.rate(&corrected);
         if self.two_step {

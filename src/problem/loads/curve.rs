@@ -14,8 +14,8 @@ const NONLINEARITY: f64 = 0.05;
 const PASSING: f64 = 0.5;
 /// Number of uniform steps sampled for the note about loads within a step.
 const STEPS: usize = 50;
-/// Number of times sampled within a step.
-const TIMES_IN_STEP: usize = 16;
+/// The intervals between sampled times are at most this fraction of the run. A step has at least 4 of them and at most 17.
+const INTERVAL: f64 = 1.0 / 340.0;
 /// Number of parts of a boundary searched for pulses and jumps. One pulse may hide another in the same part.
 const BOXES: usize = 4;
 
@@ -57,6 +57,8 @@ pub(crate) struct LoadCurve<'a> {
     pub(crate) largest: [f64; 2],
     /// Times that must be sampled, s, in increasing order.
     breaks: Vec<f64>,
+    /// Increasing times of the whole run, s, each with Σ|·| of the forces and of the displacements.
+    sums: Vec<(f64, [f64; 2])>,
     /// The end of the run, s.
     end: f64,
 }
@@ -67,9 +69,11 @@ impl<'a> LoadCurve<'a> {
         let end = problem.scene().time?.end;
         problem.loads.depend_on_time().then(|| {
             let breaks = breaks(problem, end);
-            let times = problem.scene().sample_times(100).into_iter().chain(breaks.clone());
-            let mut curve = Self { problem, largest: [0.0; 2], breaks, end };
-            times.for_each(|time| _ = curve.sample(time));
+            let mut times = [problem.scene().sample_times(100), breaks.clone()].concat();
+            times.sort_by(f64::total_cmp);
+            let mut curve = Self { problem, largest: [0.0; 2], breaks, sums: Vec::new(), end };
+            let sums = |time| (time, curve.sample(time).map(|values| sum_abs(values.into_iter())));
+            curve.sums = times.into_iter().map(sums).collect();
             curve
         })
     }
@@ -82,11 +86,14 @@ impl<'a> LoadCurve<'a> {
         &self.breaks[first..last.max(first)]
     }
 
-    /// Σ|·| of the forces and of the displacements at `time`, relative to the maximum sums; 0 if all are 0.
-    pub(crate) fn sizes(&self, time: f64) -> [f64; 2] {
-        let values = self.problem.loads.sampled_at(time);
-        let size = |kind: usize| sum_abs(values[kind].iter().copied()) / self.largest[kind];
-        [size(0), size(1)].map(|size| if size.is_finite() { size } else { 0.0 })
+    /// Increasing times of the whole run, s, each with s², the sum of squares of Σ|·| of the forces and of the
+    /// displacements, relative to the maximum sums. The part of a kind is 0 if its maximum is 0.
+    pub(crate) fn squares(&self) -> Vec<(f64, f64)> {
+        let square = |sums: &[f64; 2]| {
+            let sizes = sums.iter().zip(&self.largest).map(|(sum, largest)| sum / largest);
+            sizes.filter(|size| size.is_finite()).map(|size| size * size).sum()
+        };
+        self.sums.iter().map(|(time, sums)| (*time, square(sums))).collect()
     }
 
     /// Are loads, prescribed displacements and gaps nearly linear in time from `start` to `end`?
@@ -98,7 +105,8 @@ impl<'a> LoadCurve<'a> {
     /// Deviations of `of`(forces) and `of`(displacements) from straight lines in time: max Σ|·| over the samples.
     fn deviations(&mut self, start: f64, end: f64, of: impl Fn(&[f64]) -> Vec<f64>) -> [f64; 2] {
         let [first, last] = [start, end].map(|time| self.sample(time).map(|values| of(&values)));
-        let parts = (1..=TIMES_IN_STEP).map(|point| point as f64 / (TIMES_IN_STEP + 1) as f64);
+        let intervals = ((end - start) / (INTERVAL * self.end)).ceil().clamp(4.0, 17.0);
+        let parts = (1..intervals as usize).map(|point| point as f64 / intervals);
         let breaks = self.breaks(start, end).iter().map(|time| (time - start) / (end - start));
         let mut deviations = [0.0_f64; 2];
         for part in parts.chain(breaks).collect::<Vec<f64>>() {
