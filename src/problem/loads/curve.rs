@@ -8,13 +8,14 @@ use crate::{
 
 /// Loads count as linear in time if they deviate from a straight line by at most this fraction of the largest.
 ///
-/// Tuned on the 13 adapted runs. Half: 5 % more steps, 28 % more for `beam`. Twice: nothing changes.
+/// Tuned on the 13 adapted runs. Half: 5 % more steps, 25 % more for `beam`. Twice: two steps fewer.
 const NONLINEARITY: f64 = 0.05;
 /// Loads pass by within a step if their sum deviates from a straight line by more than this fraction.
 const PASSING: f64 = 0.5;
 /// Number of uniform steps sampled for the note about loads within a step.
 const STEPS: usize = 50;
-/// The intervals between sampled times are at most this fraction of the run. A step has at least 4 of them and at most 17.
+/// Times within a step are sampled at intervals of at most this fraction of the run. A step has 4 to 17 intervals: 4 show
+/// also loads that turn twice within it.
 const INTERVAL: f64 = 1.0 / 340.0;
 /// Number of parts of a boundary searched for pulses and jumps. One pulse may hide another in the same part.
 const BOXES: usize = 4;
