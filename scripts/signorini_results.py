@@ -114,15 +114,16 @@ def _written(scene):
         yield path, path.stem
         return
     with tempfile.NamedTemporaryFile("w", dir=".", prefix=".scene-", suffix=".toml", encoding="utf-8") as file:
-        file.writelines(f"{key} = {_toml(value)}\n" for key, value in {"title": "scene", **scene}.items())
+        tables = {"title": "scene", **scene}.items()
+        file.writelines(f"{key} = {_toml(value)}\n" for key, value in tables if value is not None)
         file.flush()
         yield Path(file.name), "scene"
 
 
 def _toml(value):
-    """A value in TOML. Strings, numbers and lists of them in JSON are the same there."""
+    """A value in TOML. Strings, numbers and lists of them in JSON are the same there. Keys that are None are left out."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(of)}" for key, of in value.items()) + "}"
+        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(of)}" for key, of in value.items() if of is not None) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
     return json.dumps(value, ensure_ascii=False, default=lambda array: array.tolist())
@@ -313,8 +314,10 @@ class Plot:
         """The contact pressure along each foundation."""
         import matplotlib.pyplot as pyplot
 
-        frame, axes = self.run.frame(time), axes or pyplot.figure(layout="compressed").subplots()
         names = [name.removesuffix(".contact_length") for name in self.run.figures if name.endswith(".contact_length")]
+        if not names:
+            raise ValueError("there is no foundation: no boundary of the scene has a gap")
+        frame, axes = self.run.frame(time), axes or pyplot.figure(layout="compressed").subplots()
         for name in names:
             axes.plot(*frame.along(name, "normal_pressure"), label=name)
         axes.set(xlabel=f"along the foundation ({self.units['length']})", ylabel=f"pressure ({self.units['stress']})",
