@@ -77,9 +77,12 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     files.push(("export.json", format!("{description:#}\n")));
     files.push(("README.md", include_str!("export.md").to_owned()));
     create(out).map_err(Failure::input)?;
-    // Files of an earlier export, of a step with other matrices.
-    let stale = ["u_D", "g", "M", "L", "source", "zeta_before"].map(|name| out.join(name));
-    stale.iter().for_each(|path| drop(fs::remove_file(path.with_extension("mtx"))));
+    // An earlier export may have files that this one has not.
+    let before = fs::read(out.join("export.json")).unwrap_or_default();
+    let before: serde_json::Value = serde_json::from_slice(&before).unwrap_or_default();
+    let stale = before["files"].as_array().into_iter().flatten().filter_map(|name| name.as_str());
+    let stale = stale.filter(|name| name.ends_with(".mtx") && !name.contains('/'));
+    stale.for_each(|name| drop(fs::remove_file(out.join(name))));
     files.iter().try_for_each(|(name, text)| write_whole(&out.join(name), text.as_bytes()))?;
     let end = rounded(states[0].time);
     say(&screen::row("results", format!("t = {end}: {}/README.md names them", out.display())));

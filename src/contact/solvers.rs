@@ -56,9 +56,9 @@ pub type SharedSolver = Rc<dyn ContactSolver>;
 /// The contact solver of a run: a name of [`REGISTRY`], perhaps with a variant, or a solver of another author.
 #[derive(Clone)]
 pub enum ChosenSolver {
-    /// By its name.
+    /// The solver of this name.
     Named(String),
-    /// Of another author.
+    /// A solver that another author wrote.
     Own(SharedSolver),
 }
 

@@ -63,7 +63,7 @@ impl<'a> Simulation<'a> {
         Self { choices: self.choices.law(source), ..self }
     }
 
-    /// Takes solver and source of other runs.
+    /// Takes the contact solver and the damage source of another run.
     #[must_use]
     pub fn choices(self, choices: &Choices) -> Self {
         Self { choices: choices.clone(), ..self }

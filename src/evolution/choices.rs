@@ -13,7 +13,7 @@ use std::rc::Rc;
 #[derive(Clone)]
 pub struct Choices {
     pub(crate) solver: ChosenSolver,
-    /// `None`: the paper's.
+    /// The damage source that another author wrote; `None` for the paper's source.
     source: Option<Rc<dyn DamageSource>>,
 }
 
@@ -39,19 +39,19 @@ impl Choices {
         }
     }
 
-    /// The same with the solver called `name`.
+    /// These choices with the contact solver called `name`.
     #[must_use]
     pub fn solver_named(self, name: &str) -> Self {
         Self { solver: ChosenSolver::Named(name.to_owned()), ..self }
     }
 
-    /// The same with another contact solver.
+    /// These choices with a contact solver that another author wrote.
     #[must_use]
     pub fn solver(self, solver: Box<dyn ContactSolver>) -> Self {
         Self { solver: ChosenSolver::Own(Rc::from(solver)), ..self }
     }
 
-    /// The same with another damage source.
+    /// These choices with a damage source that another author wrote.
     #[must_use]
     pub fn law(self, source: Box<dyn DamageSource>) -> Self {
         Self { source: Some(Rc::from(source)), ..self }

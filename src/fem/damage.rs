@@ -72,10 +72,10 @@ pub fn source(
     };
     let triangles = 0..body.mesh.triangles.len();
     let phi: Vec<_> = triangles.map(|t| source.of_triangle(&points(t))).collect();
-    // NaN is refused as well.
+    // A NaN, which is neither less nor equal, is refused too.
     let is_wrong = |phi: &f64| !matches!(phi.partial_cmp(&0.0), Some(Less | Equal));
     let all = phi.as_flattened();
-    // Counting is faster than searching.
+    // The compiler makes a faster loop of counting than of searching.
     if all.iter().filter(|phi| is_wrong(phi)).count() == 0 {
         return Ok(phi);
     }
@@ -105,9 +105,9 @@ pub fn source_load(body: &Body, mass: Mass, source: &[[f64; 3]]) -> Vec<f64> {
 /// The matrix M + kκL of (28), with the factor of this or of an earlier step length k. With several materials L is
 /// Σ_T κ_T/κ L_T, where κ belongs to the first material.
 pub struct DamageSystem {
-    /// M, m².
+    /// The mass matrix M, m².
     pub mass: Matrix,
-    /// L.
+    /// The matrix L of the Laplace operator.
     pub laplace: Matrix,
     matrix: Matrix,
     solver: LinearSolver,
@@ -258,7 +258,7 @@ impl DamageSystem {
         self.unknown.write(|x| x.fill(0.0))?;
         let size = self.rhs.norm()?;
         // Some digits of a correction or of an estimated error are enough.
-        let solved = size < NEGLIGIBLE_LOAD || self.solve(1e-6 * size)?;
+        let solved = size < NEGLIGIBLE_LOAD || self.solve(1e-4 * size)?;
         let correction = self.unknown.read(<[f64]>::to_vec)?;
         Ok(solved.then_some(correction))
     }

@@ -34,7 +34,7 @@ impl Cholmod {
         let common = &mut *this.common;
         common.nmethods = 1;
         common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
-        // SAFETY: as above.
+        // SAFETY: a live handle, the view of arrays that live during the call, and an order of all rows.
         this.factor =
             unsafe { raw::cholmod_l_analyze_p(&mut view, order.as_mut_ptr(), none, 0, common) };
         this.check(!this.factor.is_null())?;

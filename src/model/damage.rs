@@ -6,11 +6,11 @@ use serde::Deserialize;
 /// A point of the body at which the source φ is evaluated.
 #[derive(Debug, Clone, Copy)]
 pub struct DamagePoint<'a> {
-    /// (x, y), m.
+    /// The coordinates (x, y) of the point, m.
     pub place: [f64; 2],
-    /// (ε_xx, ε_yy, 2ε_xy).
+    /// The strain (ε_xx, ε_yy, 2ε_xy).
     pub strain: &'a Vector3<f64>,
-    /// ζ.
+    /// The damage ζ.
     pub zeta: f64,
     /// The constants κ, λ_D, λ_U, λ_W, q* and ζ_* of the material. A source that needs E and ν brings its own.
     pub law: &'a DamageLaw,
@@ -35,7 +35,7 @@ pub trait DamageSource {
     }
 }
 
-/// The paper's source, [`DamageLaw::source`].
+/// The damage source of the paper, [`DamageLaw::source`].
 #[derive(Debug, Clone, Copy)]
 pub struct Fremond;
 

@@ -1,7 +1,7 @@
 //! The matrices of `signorini export`, solved by programs of other authors.
 
 use crate::test_directory::{TestDirectory, sets};
-use std::process::Command;
+use std::{collections::BTreeSet, fs, process::Command};
 
 /// Two squares of different materials side by side, turned by 27°, so that no normal is parallel to an axis.
 const BLOCK: &str = "c = Cos(0.47); s = Sin(0.47); h = 0.25;
@@ -75,6 +75,37 @@ fn the_exported_matrices_have_the_answers_of_the_run() {
     }
     assert!(solved.status.success() && !out.contains("WRONG"), "{out}{err}");
     assert!(out.contains(" open closed"), "{out}");
+}
+
+/// A folder has the files of the last export alone, and files of the user.
+#[test]
+fn an_export_replaces_the_one_before() {
+    let directory = TestDirectory::new();
+    directory.write("block.geo", BLOCK);
+    let held = "[[boundary]]\nname = \"end\"\ndisplacement = [\"-0.01*t\", 0]\n";
+    directory.write("whole.toml", &format!("{SCENE}{held}"));
+    let without =
+        |line: &&str| !["damage", "time", "contact"].iter().any(|of| line.starts_with(of));
+    let [sound, _] = SCENE.split_once("[[boundary]]\nname = \"base\"").expect("a gap").into();
+    let sound = Vec::from_iter(sound.lines().filter(without)).join("\n");
+    let held = "[[boundary]]\nname = \"base\"\ndisplacement = [0, 0]\n";
+    directory.write("sound.toml", &format!("{sound}\n{held}").replace("*t*", "*"));
+    for (scene, has_damage) in [("whole.toml", true), ("sound.toml", false)] {
+        let said = directory.say(&["export", scene, "--out", "ex"]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        directory.write("ex/notes.txt", "mine");
+        let about: serde_json::Value =
+            serde_json::from_str(&directory.read("ex/export.json")).expect("JSON");
+        let files = about["files"].as_array().expect("names").iter();
+        let files = files.map(|name| name.as_str().expect("a name").to_owned());
+        let expected = files.chain(["README.md", "export.json", "notes.txt"].map(str::to_owned));
+        let found = fs::read_dir(directory.path("ex")).expect("a folder");
+        let found = found.map(|of| of.expect("an entry").file_name().into_string().expect("UTF-8"));
+        let sorted = |names: &mut dyn Iterator<Item = String>| BTreeSet::from_iter(names);
+        assert_eq!(sorted(&mut { found }), sorted(&mut { expected }), "{scene}");
+        assert_eq!(directory.path("ex/M.mtx").exists(), has_damage);
+        assert_eq!(directory.path("ex/g.mtx").exists(), has_damage);
+    }
 }
 
 /// K has no entries for PETSc's viewers, which would write an empty file.

@@ -426,23 +426,23 @@ fn through(name: &str, points: &[[f64; 2]]) -> impl Fn(f64) -> f64 + use<> {
     move |x| function.eval(x, 0.0, 0.0)
 }
 
+/// Points that rise, fall and stay, at uneven distances.
+const UNEVEN: [[f64; 2]; 8] = [
+    [-2.0, 3.0],
+    [-1.5, 1.0],
+    [-0.25, -0.5],
+    [0.0, -0.5],
+    [0.75, 0.25],
+    [2.0, 0.125],
+    [2.125, 2.0],
+    [4.0, 2.5],
+];
+
 /// Values of scipy.interpolate.CubicSpline (SciPy 1.10), whose ends are no knots: a cubic function is itself, as is the
 /// parabola of three points.
 #[test]
 fn splines_are_those_of_other_programs() {
-    let f = through(
-        "spline",
-        &[
-            [-2.0, 3.0],
-            [-1.5, 1.0],
-            [-0.25, -0.5],
-            [0.0, -0.5],
-            [0.75, 0.25],
-            [2.0, 0.125],
-            [2.125, 2.0],
-            [4.0, 2.5],
-        ],
-    );
+    let f = through("spline", &UNEVEN);
     for (x, expected) in [
         (-1.75, 1.850062254571168),
         (-1.0, -0.0002490182846720812),
@@ -489,19 +489,7 @@ fn random_points(random: &mut Random, count: usize) -> Vec<[f64; 2]> {
 /// Values of scipy.interpolate.PchipInterpolator (SciPy 1.15).
 #[test]
 fn monotone_cubics_are_those_of_other_programs() {
-    let f = through(
-        "pchip",
-        &[
-            [-2.0, 3.0],
-            [-1.5, 1.0],
-            [-0.25, -0.5],
-            [0.0, -0.5],
-            [0.75, 0.25],
-            [2.0, 0.125],
-            [2.125, 2.0],
-            [4.0, 2.5],
-        ],
-    );
+    let f = through("pchip", &UNEVEN);
     for (x, expected) in [
         (-1.75, 1.825),
         (-1.0, 0.112),

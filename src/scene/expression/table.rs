@@ -6,7 +6,7 @@ use std::path::Path;
 /// The shape of a function between two points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shape {
-    /// A line.
+    /// A line between two points.
     Linear,
     /// A cubic function; the second derivative is continuous.
     Cubic,
@@ -152,13 +152,12 @@ fn slopes(points: &[[f64; 2]], shape: Shape) -> Vec<f64> {
         }
         (Shape::Cubic, _) => twice_differentiable(&secants),
         // Limited to between 0 and 3s₁ (Moler, Numerical Computing with MATLAB, 2004, 3.6).
-        (Shape::Monotone, [first, second, ..]) => {
+        (Shape::Monotone, all) => {
             let limited =
                 |a: [f64; 2], b| end(a, b).clamp((3.0 * a[1]).min(0.0), (3.0 * a[1]).max(0.0));
-            let [.., before, last] = &secants[..] else { unreachable!("two intervals") };
-            let mut slopes = vec![limited(*first, *second)];
+            let mut slopes = vec![limited(all[0], all[1])];
             slopes.extend(secants.windows(2).map(|pair| monotone(pair[0], pair[1])));
-            slopes.push(limited(*last, *before));
+            slopes.push(limited(all[all.len() - 1], all[all.len() - 2]));
             slopes
         }
     }
