@@ -102,8 +102,8 @@ fn interrupted(signal: Signal) -> Failure {
 }
 
 /// The factor for the tolerance of the time steps in a second run, if the time steps of the first one miss the required
-/// accuracy and the mesh leaves them a part of it. It is at most ⅛, and at least 1/64: the error of a step is of third order,
-/// so steps are half or a quarter as long, one or two of their lengths.
+/// accuracy and the mesh leaves them a part of it. It is at most ½, and at least 1/64: the error of a step is of third order,
+/// so there are then about four times as many steps.
 pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     let accuracy = task.problem.scene().accuracy?;
     let bars = task.measured.bars.iter().zip(&outcome.bars);
@@ -118,7 +118,7 @@ pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
     });
     let limit = if is_unconfirmed_stop(task, outcome) { 0.5 } else { 1.0 };
     let factor = factor.fold(limit, f64::min);
-    (0.0 < factor && factor < 1.0).then_some(factor.clamp(1.0 / 64.0, 1.0 / 8.0))
+    (0.0 < factor && factor < 1.0).then_some(factor.clamp(1.0 / 64.0, 0.5))
 }
 
 /// Is there time to repeat a run of some `seconds` with a tolerance of the steps that is smaller by `ratio`? Their errors are of

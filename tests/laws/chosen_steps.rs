@@ -74,17 +74,17 @@ fn steps_end_at_the_times_of_output_and_are_no_more_than_these_take() {
 }
 
 #[test]
-fn lengths_are_the_longest_one_halved_so_that_a_factor_serves_many_steps() {
+fn lengths_are_the_longest_one_over_powers_of_the_root_of_2_so_that_a_factor_serves_many_steps() {
     for load in ["-80*t", "-80*sin(4*t)", "if(t < 0.6, -40, -80)"] {
         let (steps, outcome) = lshape("time.step=auto", load);
         let length = |pair: &[Step]| pair[1].state.time - pair[0].state.time;
         // The last two steps reach the end, and a step may end at a jump.
         let lengths: Vec<f64> = steps.windows(2).map(length).collect();
-        let halvings = lengths.iter().map(|length| (0.05 / length).log2());
-        let others = halvings.filter(|times| (times - times.round()).abs() > 1e-6).count();
+        let powers = lengths.iter().map(|length| 2.0 * (0.05 / length).log2());
+        let others = powers.filter(|times| (times - times.round()).abs() > 1e-6).count();
         println!("{load}: {} steps, {others} of other lengths", outcome.last.record.step);
         assert!(lengths.len() > 12 && others <= 3, "{load}: {lengths:?}");
-        // A length is kept for two steps and more, on average.
+        // A length is kept for two steps on average.
         let kept = lengths.windows(2).filter(|pair| (pair[0] / pair[1] - 1.0).abs() < 1e-6).count();
         assert!(2 * kept >= lengths.len(), "{load}: {lengths:?}");
     }
