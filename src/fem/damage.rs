@@ -257,8 +257,8 @@ impl DamageSystem {
         self.rhs.write(|rhs| rhs.iter_mut().zip(load).for_each(|(r, b)| *r = step * b))?;
         self.unknown.write(|x| x.fill(0.0))?;
         let size = self.rhs.norm()?;
-        // Some digits of a correction or of an estimated error are enough.
-        let solved = size < NEGLIGIBLE_LOAD || self.solve(1e-4 * size)?;
+        // Some digits of an estimated error would do, but a correction becomes part of ζ.
+        let solved = size < NEGLIGIBLE_LOAD || self.solve(1e-6 * size)?;
         let correction = self.unknown.read(<[f64]>::to_vec)?;
         Ok(solved.then_some(correction))
     }
