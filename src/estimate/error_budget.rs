@@ -1,5 +1,6 @@
 //! The computation of the error budget.
 
+use super::equilibrated::Unproved;
 use crate::{
     evolution::{ErrorBudget, Outcome},
     problem::{DiscreteProblem, State},
@@ -7,11 +8,13 @@ use crate::{
 use nalgebra::DVector;
 
 impl ErrorBudget {
-    /// The budget of the last accepted state, from the error of its ζ by the `steps` and its error bar. Collective.
+    /// The budget of the last accepted state, from the error of its ζ by the `steps` and its error bar, and from the proved error
+    /// of u with what the proof leaves out, or the reason why there is none. Collective.
     pub(super) fn new(
         problem: &DiscreteProblem,
         outcome: &Outcome,
         steps: Option<[DVector<f64>; 2]>,
+        proof: Result<(f64, Vec<&'static str>), Unproved>,
     ) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
         let caused = |error: &[f64]| displacement_error_of(problem, error, state);
@@ -19,6 +22,8 @@ impl ErrorBudget {
         let bars = |[_, bar]: &[DVector<f64>; 2]| (bar.clone(), caused(bar.as_slice()));
         Self {
             displacement_mesh: accuracy.energy,
+            displacement_bound: proof.as_ref().ok().map(|(bound, _)| *bound),
+            reservations: proof.map_or_else(|reason| vec![reason], |(_, left_out)| left_out),
             damage_mesh: None,
             displacement_steps: error.map(caused),
             damage_steps: error.and_then(|error| relative_to_damage(problem, error, state)),

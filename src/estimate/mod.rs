@@ -15,6 +15,7 @@
 //! and returns the [`Outcome`] with the estimates. `command` requests this, an adapted mesh and error bars. Nothing
 //! here changes the answer of a run.
 
+mod equilibrated;
 mod recovery;
 mod extremes;
 mod error_budget;
@@ -32,7 +33,7 @@ pub use simulation::Simulation;
 use crate::{
     evolution::{ErrorBudget, Outcome, Run, RunError},
     petsc::PetscError,
-    problem::{Bar, DiscreteProblem},
+    problem::{Bar, DiscreteProblem, State},
 };
 use nalgebra::DVector;
 
@@ -45,6 +46,13 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
     let (problem, phases) = (damage_step.problem, damage_step.phases);
     outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
     outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
+    let state = representative(&outcome).clone();
+    let proof = phases.time("proof", || {
+        equilibrated::proved_error(&mut contact_step, &state, outcome.accuracy.energy)
+    })?;
+    if let Ok(proof) = &proof {
+        outcome.accuracy.energy = outcome.accuracy.energy.min(proof.relative);
+    }
     outcome.penetration = phases.time("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
@@ -52,16 +60,22 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
         && outcome.stopped.is_none()
         && controller.add_last_error(&mut damage_step).is_ok();
     let steps = is_known.then(|| [controller.step_error(), controller.step_bar()]);
-    outcome.errors = ErrorBudget::new(problem, &outcome, steps);
+    outcome.errors =
+        ErrorBudget::new(problem, &outcome, steps, proof.map(|of| (of.relative, of.left_out)));
     Ok(outcome)
 }
 
-/// The estimated discretisation error of u, relative, in the energy norm: of the last step, or of the step with the
-/// maximum displacement if the last one is unloaded. The small u left then gives a poor estimate. Collective.
-fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, PetscError> {
+/// The last state, or the one with the maximum displacement if the last one is unloaded. The small u left then gives a poor
+/// estimate.
+fn representative(outcome: &Outcome) -> &State {
     let (last, most) = (&outcome.last, outcome.most_displaced());
     let unloaded = last.record.displacement_max < UNLOADED * most.record.displacement_max;
-    let state = if unloaded { &most.state } else { &last.state };
+    if unloaded { &most.state } else { &last.state }
+}
+
+/// The estimated discretisation error of u, relative, in the energy norm. Collective.
+fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, PetscError> {
+    let state = representative(outcome);
     let (body, u) = (&problem.body, &problem.strained(state).u);
     let (recovered, zeta) = (RecoveredStrains::new(body, u)?, problem.zeta_at_points(&state.zeta));
     Ok(recovered.energy_error(&problem.terms, &zeta, u).relative())

@@ -10,6 +10,11 @@ use serde::Serialize;
 pub struct ErrorBudget {
     /// The error of u from the mesh.
     pub displacement_mesh: f64,
+    /// A proved bound on this error, for the given ζ; `None` if there is none.
+    pub displacement_bound: Option<f64>,
+    /// What the proof leaves out, or the reason why there is none.
+    #[serde(skip)]
+    pub reservations: Vec<&'static str>,
     /// The error of the damage from the mesh; `None` if it is not measured, and if the run stopped at ζ_*, where it grows
     /// without bound.
     pub damage_mesh: Option<f64>,
@@ -31,6 +36,28 @@ pub struct ErrorBudget {
 const NEGLIGIBLE_ERROR: f64 = 1e-9;
 
 impl ErrorBudget {
+    /// The error of u from the mesh: the proved bound, or the estimate.
+    fn of_displacements(&self) -> String {
+        let (estimate, reservations) =
+            (percent(self.displacement_mesh), self.reservations.join(", "));
+        let error = match (self.displacement_bound, &reservations[..]) {
+            // A bound of 100 % says nothing.
+            (Some(1.0..), _) => format!("{estimate} (energy norm, estimated)"),
+            (None, "") => format!("{estimate} (energy norm)"),
+            (None, reason) => format!("{estimate} (energy norm, estimated: no proof, as {reason})"),
+            (Some(bound), "") => {
+                format!("at most {} (energy norm, proved for this ζ)", percent(bound))
+            }
+            (Some(bound), left_out) => {
+                format!(
+                    "at most {} (energy norm, proved for this ζ, but {left_out})",
+                    percent(bound)
+                )
+            }
+        };
+        format!("from the mesh: u {error}")
+    }
+
     /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of
     /// that time replaces the error of the damage.
     pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
@@ -77,7 +104,7 @@ impl ErrorBudget {
             _ => "; to improve: the mesh",
         };
         [
-            format!("from the mesh: u {} (energy norm)", percent(self.displacement_mesh)),
+            self.of_displacements(),
             format!("from the mesh: {of_mesh}"),
             format!("from the time steps: {of_steps}"),
             format!("from the solver: u {of_solver}{advice}"),

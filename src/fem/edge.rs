@@ -19,7 +19,7 @@ pub struct Edge {
 pub const GAUSS: [f64; 2] = [0.211_324_865_405_187_08, 0.788_675_134_594_812_9];
 
 /// The abscissae ½ and ½ ∓ √15/10 of the three Gauss points of an edge, and their weights.
-pub(super) const THREE_GAUSS: [[f64; 2]; 3] = [
+pub(crate) const THREE_GAUSS: [[f64; 2]; 3] = [
     [0.112_701_665_379_258_31, 5.0 / 18.0],
     [0.5, 8.0 / 18.0],
     [0.887_298_334_620_741_7, 5.0 / 18.0],

@@ -31,6 +31,7 @@ pub(crate) use cells::for_elements;
 pub use cells::{Cells, Elements};
 pub use damage::{DamageSystem, Mass, WrongSource, source, source_load};
 pub use damage_certificate::DamageCertificate;
+pub(crate) use edge::THREE_GAUSS;
 pub use edge::{Edge, GAUSS, gauss_points, normal_error, parabola};
 pub use elasticity::Elasticity;
 pub use element::{Element, POINTS, QuadraturePoint, quadratic_values};

@@ -12,11 +12,13 @@ pub(super) use parts::{DEVIATION, centroid, edge_parts, triangle_parts, triangle
 use super::boundary_conditions::{BoundaryConditions, RowValue};
 use crate::{
     contact::NodalConstraint,
-    fem::{Body, Subdomain},
+    fem::{Body, Edge, Subdomain, for_elements},
+    mesh::sorted,
     scene::{Expression, Scene},
 };
 use forces::BodyForce;
 pub(super) use forces::SurfaceForce;
+use rustc_hash::FxHashMap as HashMap;
 use std::mem::take;
 
 /// A note is given if more than this fraction of a load, a displacement or a damage is missed.
@@ -36,6 +38,14 @@ pub struct Loads {
     first_gaps: Vec<f64>,
     /// The nodal loads, if they do not depend on time.
     constant: Option<Vec<f64>>,
+}
+
+/// The loads ∫ f·φ_i of each element, N per metre of thickness.
+pub(crate) struct ElementLoads {
+    /// Per triangle: at its vertices, and for P2 at the midpoints of the sides 01, 12, 20.
+    pub(crate) triangles: Vec<[[f64; 2]; 6]>,
+    /// By the nodes at the ends of a loaded edge in increasing order: at these ends and in its middle.
+    pub(crate) edges: HashMap<[usize; 2], [[f64; 2]; 3]>,
 }
 
 impl Loads {
@@ -150,8 +160,34 @@ impl Loads {
 
     fn assemble(&self, body: &Body, t: f64) -> Vec<f64> {
         let mut load = vec![0.0; 2 * body.nodes.partition.local()];
-        self.body_force.iter().for_each(|force| force.add(body, t, &mut load));
-        self.surface_forces.iter().for_each(|force| force.add(body, t, &mut load));
+        let mut add = |node: usize, [fx, fy]: [f64; 2]| {
+            load[2 * node] += fx;
+            load[2 * node + 1] += fy;
+        };
+        for_elements!(body, cells => {
+            let mut of_triangle = |t: usize, i: usize, f| add(cells.nodes[t][i], f);
+            self.body_force.iter().for_each(|force| force.add(body, t, &mut of_triangle));
+        });
+        let mut of_edge = |_: &Edge, node: usize, f| add(node, f);
+        self.surface_forces.iter().for_each(|force| force.add(body, t, &mut of_edge));
         load
+    }
+
+    /// The loads at time t by triangles and by edges. Their sums at the nodes are [`Self::at`].
+    pub(crate) fn by_elements(&self, body: &Body, t: f64) -> ElementLoads {
+        let mut loads = ElementLoads {
+            triangles: vec![[[0.0; 2]; 6]; body.triangles.len()],
+            edges: HashMap::default(),
+        };
+        let add = |to: &mut [f64; 2], [fx, fy]: [f64; 2]| *to = [to[0] + fx, to[1] + fy];
+        let mut of_triangle = |t: usize, i: usize, f| add(&mut loads.triangles[t][i], f);
+        self.body_force.iter().for_each(|force| force.add(body, t, &mut of_triangle));
+        let mut of_edge = |edge: &Edge, node: usize, f| {
+            let ends = sorted(edge.ends);
+            let place = ends.iter().position(|&end| end == node).unwrap_or(2);
+            add(&mut loads.edges.entry(ends).or_default()[place], f);
+        };
+        self.surface_forces.iter().for_each(|force| force.add(body, t, &mut of_edge));
+        loads
     }
 }

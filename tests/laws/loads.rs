@@ -32,6 +32,17 @@ fn whole(body: &Body, edges: &[[usize; 2]]) -> impl Iterator<Item = (Edge, [f64;
     body.edges(edges).into_iter().map(|edge| (edge, [0.0, 1.0]))
 }
 
+/// Adds a force to the loads of a node.
+fn add(load: &mut [f64], node: usize, [fx, fy]: [f64; 2]) {
+    load[2 * node] += fx;
+    load[2 * node + 1] += fy;
+}
+
+/// Node `i` of triangle `t`.
+fn node(body: &Body, t: usize, i: usize) -> usize {
+    body.quadratic_nodes().map_or_else(|| body.mesh.triangles[t][i], |nodes| nodes[t][i])
+}
+
 #[test]
 fn quadratic_tractions_and_affine_body_forces_are_integrated_exactly() {
     for order in ORDERS {
@@ -49,13 +60,15 @@ fn quadratic_tractions_and_affine_body_forces_are_integrated_exactly() {
             &body.nodes.points,
             whole(&body, &body.mesh.curves["top"].edges),
             f,
-            &mut load,
+            &mut |_, node, f| add(&mut load, node, f),
         );
         check(&load, [[2.0, 4.0 / 3.0, 2.0], [1.0, 0.75, 1.0]]);
         // f = (2 − x + 3y, 6y) on the square. ∫xy = 1/4, ∫x² = 1/3.
         let mut load = zero;
         let f = |_, [x, y]: [f64; 2]| [2.0 - x + 3.0 * y, 6.0 * y];
-        add_body_force(&body, &TriangleParts::default(), f, &mut load);
+        add_body_force(&body, &TriangleParts::default(), f, &mut |t, i, f| {
+            add(&mut load, node(&body, t, i), f)
+        });
         check(&load, [[3.0, 17.0 / 12.0, 1.75], [3.0, 1.5, 2.0]]);
     }
 }
@@ -75,7 +88,7 @@ fn a_pressure_all_around_has_no_resultant() {
                     &body.nodes.points,
                     whole(&body, &[*edge]),
                     |_, normal| normal,
-                    &mut load,
+                    &mut |_, node, f| add(&mut load, node, f),
                 );
             }
         }
@@ -92,7 +105,12 @@ fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
     let body = Body::new(curved(), Order::Quadratic);
     for curve in body.mesh.curves.values() {
         let mut load = vec![0.0; 2 * body.nodes.points.len()];
-        add_traction(&body.nodes.points, whole(&body, &curve.edges), |_, normal| normal, &mut load);
+        add_traction(
+            &body.nodes.points,
+            whole(&body, &curve.edges),
+            |_, normal| normal,
+            &mut |_, node, f| add(&mut load, node, f),
+        );
         let ends = curve.edges.iter().map(|edge| edge.map(|node| body.mesh.nodes[node]));
         let square = |[x, y]: [f64; 2]| x * x + y * y;
         let mut expected = [0.0; 3];
@@ -124,7 +142,12 @@ fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
         let traction = |_, [nx, ny]: [f64; 2]| {
             [stress[0] * nx + stress[2] * ny, stress[2] * nx + stress[1] * ny]
         };
-        add_traction(&body.nodes.points, whole(&body, &curve.edges), traction, &mut load);
+        add_traction(
+            &body.nodes.points,
+            whole(&body, &curve.edges),
+            traction,
+            &mut |_, node, f| add(&mut load, node, f),
+        );
     }
     let error = difference(&load, &force);
     assert!(error < 1e-13, "{error}");
@@ -135,7 +158,9 @@ fn body_forces_on_curved_elements_have_their_resultant() {
     // x and the Jacobian are quadratic: a uniform f is integrated exactly.
     let body = Body::new(curved(), Order::Quadratic);
     let mut load = vec![0.0; 2 * body.nodes.points.len()];
-    add_body_force(&body, &TriangleParts::default(), |_, _| [2.0, -3.0], &mut load);
+    add_body_force(&body, &TriangleParts::default(), |_, _| [2.0, -3.0], &mut |t, i, f| {
+        add(&mut load, node(&body, t, i), f)
+    });
     let [[x, ..], [y, ..]] = moments(&body, &load);
     let area = curved_area(&body.mesh);
     close(x, 2.0 * area, 1e-14);

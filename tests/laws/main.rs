@@ -20,6 +20,7 @@ mod contact;
 mod contact_pressure;
 mod damage;
 mod elements;
+mod equilibrated;
 mod extrapolation;
 mod foreign;
 mod hertz;

@@ -3,7 +3,7 @@
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
     evolution::{DiscreteProblem, Outcome, State},
-    linear::LinearSystem,
+    linear::{LinearSystem, SolveReport},
     petsc::PetscError,
 };
 
@@ -71,7 +71,7 @@ impl Accuracy {
     }
 }
 
-impl ContactStep<'_> {
+impl<'a> ContactStep<'a> {
     /// After a run: estimates the errors of its last step, relative to the maximum displacement. The step with the
     /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
     /// promised error. The factor of the last solve is usually good enough.
@@ -92,9 +92,9 @@ impl ContactStep<'_> {
     /// Estimates max |K⁻¹(f − Ku)| / `max` with the active nodes fixed, to one digit or more: the correction by the
     /// residual forces. Collective.
     fn of_state(&mut self, state: &State, max: f64) -> Result<Accuracy, PetscError> {
-        let Self { problem, stiffness, elastic, load, c, .. } = self;
+        let problem = self.problem;
         let DiscreteProblem { body, constraints, .. } = problem;
-        let (partition, bases) = (&body.nodes.partition, &constraints.bases);
+        let partition = &body.nodes.partition;
         let mut accuracy = Accuracy { time: state.time, ..Accuracy::default() };
         if max == 0.0 || partition.max_norm(&state.u) == 0.0 {
             return Ok(accuracy);
@@ -103,31 +103,71 @@ impl ContactStep<'_> {
         let internal = problem.terms.internal_force(body, &zeta, &state.u);
         let mut forces = problem.motions.balanced(body, problem.load(state.time));
         forces.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
-        bases.force_to_local(&mut forces);
-        bases.zero_fixed(&mut forces);
         let flags = active_bounds(constraints, &state.contact, 0.0);
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         let active: Vec<_> = active.map(|(bound, _)| bound.dof).collect();
-        active.iter().for_each(|&dof| forces[dof] = 0.0);
-        load.set(&forces[..load.owned()])?;
-        c.write(|u| u.fill(0.0))?;
-        stiffness.set_damage(body, &zeta);
-        let system = LinearSystem {
-            prescribed: partition.comm().any(!active.is_empty()).then_some(&active[..]),
-            scale: stiffness.scale,
-            ..LinearSystem::of(&stiffness.matrix)
-        };
         // With an old factor, the error may have one digit less than the residual.
-        let limit = 0.01 * load.norm()?;
-        let solved = elastic.solve_renewing(system, load, c, limit)?;
+        let (solved, correction) = self.corrected(&zeta, forces, &active, 0.01)?;
         accuracy.gave_up = solved.gave_up;
         accuracy.displacement = match solved.converged {
-            true => {
-                let correction = displacement(problem, vec![0.0; forces.len()], c)?;
-                partition.max_norm(&correction) / max
-            }
+            true => partition.max_norm(&correction) / max,
             false => f64::INFINITY,
         };
         Ok(accuracy)
+    }
+
+    /// K⁻¹ f for nodal `forces` f, with ζ at the quadrature points and the unknowns `held` at zero, up to a residual of
+    /// `reduction` ‖f‖. Collective.
+    pub(crate) fn corrected(
+        &mut self,
+        zeta: &[f64],
+        mut forces: Vec<f64>,
+        held: &[usize],
+        reduction: f64,
+    ) -> Result<(SolveReport, Vec<f64>), PetscError> {
+        let Self { problem, stiffness, elastic, load, c, .. } = self;
+        let DiscreteProblem { body, constraints, .. } = problem;
+        constraints.bases.force_to_local(&mut forces);
+        constraints.bases.zero_fixed(&mut forces);
+        held.iter().for_each(|&dof| forces[dof] = 0.0);
+        load.set(&forces[..load.owned()])?;
+        c.write(|u| u.fill(0.0))?;
+        stiffness.set_damage(body, zeta);
+        let comm = body.nodes.partition.comm();
+        let system = LinearSystem {
+            prescribed: comm.any(!held.is_empty()).then_some(held),
+            scale: stiffness.scale,
+            ..LinearSystem::of(&stiffness.matrix)
+        };
+        let limit = reduction * load.norm()?;
+        let solved = elastic.solve_renewing(system, load, c, limit)?;
+        Ok((solved, displacement(problem, vec![0.0; forces.len()], c)?))
+    }
+
+    /// Bounded unknowns that prevent the motions which contact alone prevents, one for each: the largest pivots of Gaussian
+    /// elimination on their u·ν, in increasing order. Collective.
+    pub(crate) fn holding(&self) -> Vec<usize> {
+        let (comm, mut rows) = (self.problem.body.nodes.partition.comm(), self.rigid.clone());
+        let mut held = Vec::new();
+        for k in 0..rows.ncols() {
+            let size = |i: &usize| rows[(*i, k)].abs();
+            let best = (0..rows.nrows()).max_by(|i, j| size(i).total_cmp(&size(j)));
+            let (_, rank) = comm.min_with_rank(-best.as_ref().map_or(0.0, size));
+            let entry = |j| best.map_or(0.0, |i| rows[(i, j)]);
+            let pivot: Vec<f64> =
+                (0..rows.ncols()).map(|j| comm.broadcast(rank, entry(j))).collect();
+            let own = best.filter(|_| comm.rank() == rank);
+            held.extend(own.map(|i| self.problem.constraints.bounds[i].dof));
+            let column = rows.column(k).clone_owned();
+            (k + 1..rows.ncols())
+                .for_each(|j| rows.column_mut(j).axpy(-pivot[j] / pivot[k], &column, 1.0));
+        }
+        held.sort_unstable();
+        held
+    }
+
+    /// The problem.
+    pub(crate) fn problem(&self) -> &'a DiscreteProblem {
+        self.problem
     }
 }

@@ -65,11 +65,11 @@ impl SurfaceForce {
         self.parts(t, RESULTANT_ERROR)
     }
 
-    /// Adds the nodal loads at time t.
-    pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
+    /// Calls `add` with the forces at the nodes of its edges at time t.
+    pub(super) fn add(&self, body: &Body, t: f64, add: &mut dyn FnMut(&Edge, usize, [f64; 2])) {
         let parts = self.resolved(t).parts.into_iter();
         let parts = parts.filter_map(|(edge, part)| Some((self.edges[edge]?, part)));
-        add_traction(&body.nodes.points, parts, |x, normal| self.force.at(x, normal, t), load);
+        add_traction(&body.nodes.points, parts, |x, normal| self.force.at(x, normal, t), add);
     }
 
     /// The estimated error of the resultant (F_x, F_y) and the moment about `centre` at time t by the shape of the edges:
@@ -84,12 +84,14 @@ impl SurfaceForce {
             edge_parts(lines, self.force.expressions(), t, RESULTANT_ERROR).parts.into_iter();
         let edge = |edge| Edge { ends: [3 * edge, 3 * edge + 2], middle: Some(3 * edge + 1) };
         let (points, parts) = (lines.as_flattened(), parts.map(|(line, part)| (edge(line), part)));
-        let mut load = vec![0.0; 2 * points.len()];
-        add_traction(points, parts, |x, normal| self.force.at(x, normal, t), &mut load);
-        let forces = points.iter().zip(load.as_chunks().0);
-        forces.fold([0.0; 3], |[x, y, moment], (point, [fx, fy])| {
-            [x + fx, y + fy, moment + (point[0] - cx) * fy - (point[1] - cy) * fx]
-        })
+        let mut sums = [0.0; 3];
+        let mut add = |_: &Edge, node: usize, [fx, fy]: [f64; 2]| {
+            let [x, y] = points[node];
+            let parts = [fx, fy, (x - cx) * fy - (y - cy) * fx];
+            sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+        };
+        add_traction(points, parts, |x, normal| self.force.at(x, normal, t), &mut add);
+        sums
     }
 
     /// The forces on all edges at time t, by expression.
@@ -210,14 +212,14 @@ impl BodyForce {
         self.force.iter().chain(&self.gravity)
     }
 
-    /// Adds the nodal loads at time t.
-    pub(super) fn add(&self, body: &Body, t: f64, load: &mut [f64]) {
+    /// Calls `add` with the forces at the nodes of the triangles at time t.
+    pub(super) fn add(&self, body: &Body, t: f64, add: &mut dyn FnMut(usize, usize, [f64; 2])) {
         let gravity = self.gravity.each_ref().map(|g| g.eval(0.0, 0.0, t));
         let at = |triangle: usize, [x, y]: [f64; 2]| {
             let density = self.densities[body.material(triangle)];
             [0, 1].map(|k| self.force[k].eval(x, y, t) + density * gravity[k])
         };
-        add_body_force(body, &self.parts_of_triangles, at, load);
+        add_body_force(body, &self.parts_of_triangles, at, add);
     }
 
     /// The forces on some triangles at time t, by component.

@@ -2,8 +2,10 @@
 
 use signorini::{
     evolution::{RunError, SetupError},
+    mesh::MeshError,
     output::OutputError,
     petsc::PetscError,
+    scene::SceneError,
 };
 
 /// A study could not be carried out.
@@ -15,6 +17,12 @@ pub enum StudyError {
     /// A run ended in a way the study does not expect.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A scene cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A mesh cannot be used.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// A map of another name was asked for.
     #[error("{0}")]
     UnknownMap(String),

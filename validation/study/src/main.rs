@@ -8,6 +8,7 @@ use signorini::{
 };
 use signorini_study::{
     StudyError,
+    bounds::errors,
     stability::{MAPS, make},
 };
 use std::{
@@ -44,10 +45,18 @@ enum Command {
         #[arg(last = true, value_name = "PETSC OPTIONS")]
         petsc: Vec<String>,
     },
+    /// Compare the proved bound on the error of u with the true error: a line of JSON.
+    Bounds {
+        /// The scene.
+        scene: PathBuf,
+        /// Sets a key of the scene.
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
 }
 
 fn main() -> ExitCode {
-    let Command::Stability { maps, out, petsc } = Arguments::parse().command;
+    let command = Arguments::parse().command;
     if Communicator::launched().is_some_and(|ranks| ranks > 1) {
         // Every rank comes here; choosing the one that writes needs no communication.
         let rank =
@@ -57,13 +66,25 @@ fn main() -> ExitCode {
         }
         return ExitCode::from(2);
     }
-    match stability(&maps, &out, &petsc) {
+    let done = match command {
+        Command::Stability { maps, out, petsc } => stability(&maps, &out, &petsc),
+        Command::Bounds { scene, set } => bounds(&scene, &set),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(if error.is_input() { 2 } else { 1 })
         }
     }
+}
+
+/// Prints the errors of a scene.
+fn bounds(scene: &Path, overrides: &[String]) -> Result<(), StudyError> {
+    let session = Session::start(&[])?;
+    let errors = errors(&session, scene, overrides)?;
+    say(&serde_json::json!(errors).to_string());
+    Ok(session.finalize()?)
 }
 
 /// Makes the maps and counts their rows.

@@ -1,0 +1,355 @@
+//! Stresses on a triangle from the tractions on its sides.
+//!
+//! The triangle is cut at its centroid into three parts. On each part the stress is symmetric and a polynomial of degree k; between
+//! parts its tractions are continuous. Such a stress exists for all tractions of degree k on the sides that balance the
+//! body force: for k = 1 exactly one (Johnson and Mercier, Numer. Math. 30, 1978), for k = 2 a family with three
+//! parameters (Arnold, Douglas and Gupta, Numer. Math. 45, 1984), of which the error takes the best one.
+//!
+//! With x = x_0 + J x̂, the stress τ = J τ̂ Jᵀ/det J has the forces J(τ̂n̂ dŝ) on sides and J(div τ̂ dx̂) in the body. So all
+//! triangles share one map from forces to stresses, which is made once.
+
+use crate::fem::{THREE_GAUSS, Triangle};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use std::sync::LazyLock;
+
+/// The forces on a triangle. Per side 01, 12, 20: ∫ τn ψ for the hat functions ψ of its first and its second end, and
+/// for the bubble 4 ψ_first ψ_second, N per metre of thickness. Linear tractions do not use the last one.
+pub(super) type SideForces = [[Vector2<f64>; 3]; 3];
+
+/// The quadrature points of the three parts, exact for polynomials of degree 5 (Radon, Monatsh. Math. 52, 1948).
+const POINTS: usize = 21;
+/// The components (σ_xx, σ_yy, σ_xy) of a stress at all points.
+const VALUES: usize = 3 * POINTS;
+
+/// The map from the forces on the reference triangle to the stresses in it, for tractions of degree k with D = 6k + 12
+/// components of forces, R = 4k + 4 of them on two sides.
+pub(super) struct Composite<const R: usize, const D: usize> {
+    /// The barycentric coordinates of the points, and their weights as parts of |T|.
+    points: [([f64; 3], f64); POINTS],
+    /// The stresses at the points.
+    stresses: SMatrix<f64, VALUES, D>,
+    /// The stresses without forces, per parameter; none for k = 1.
+    free: Vec<SVector<f64, VALUES>>,
+    /// Per vertex, for the forces on its first and its last side (R components) and all forces, these two sides first: per pair of
+    /// components i ≤ j of a stress, ∫ (σ_i σ_j + σ_j σ_i)/|T| (i < j) or ∫ σ_i²/|T| as a bilinear form.
+    products: [[SMatrix<f64, R, D>; 6]; 3],
+}
+
+/// The pairs of components of a stress.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// The map of a triangle from the reference triangle.
+pub(super) struct Frame {
+    /// J⁻¹, 1/m.
+    pub(super) inverse: Matrix2<f64>,
+    /// P of σ = P σ̂ in components, J σ̂ Jᵀ/det J, 1 without unit.
+    to_physical: Matrix3<f64>,
+    /// |T|, m².
+    area: f64,
+}
+
+impl Frame {
+    /// The frame of a triangle with these corners, m.
+    pub(super) fn new([a, b, c]: [Vector2<f64>; 3]) -> Self {
+        let jacobian = Matrix2::from_columns(&[b - a, c - a]);
+        let [p, q, r, s] = [jacobian.m11, jacobian.m12, jacobian.m21, jacobian.m22];
+        let determinant = jacobian.determinant();
+        let [x, y] = [[p * p, q * q, 2.0 * p * q], [r * r, s * s, 2.0 * r * s]];
+        let to_physical = Matrix3::from([x, y, [p * r, q * s, p * s + q * r]]).transpose();
+        Self {
+            inverse: Matrix2::new(s, -q, -r, p) / determinant,
+            to_physical: to_physical / determinant,
+            area: 0.5 * determinant,
+        }
+    }
+
+    /// ∫ σ̂ : A⁻¹ σ̂ as a quadratic form of the mean of σ̂, with A⁻¹ as a matrix, 1/Pa.
+    pub(super) fn metric(&self, compliance: &Matrix3<f64>) -> Matrix3<f64> {
+        self.to_physical.transpose() * compliance * self.to_physical * self.area
+    }
+}
+
+pub(super) static LINEAR: LazyLock<Composite<8, 18>> = LazyLock::new(|| Composite::new(1));
+pub(super) static QUADRATIC: LazyLock<Composite<12, 24>> = LazyLock::new(|| Composite::new(2));
+
+/// A triangle with an affine strain and ζ, and the forces on it.
+pub(super) struct LoadedTriangle<'a> {
+    pub(super) frame: Frame,
+    /// The matrix D of A, Pa.
+    pub(super) d: &'a Matrix3<f64>,
+    /// (ε_xx, ε_yy, 2ε_xy) and ζ at the vertices.
+    pub(super) strains: [Vector3<f64>; 3],
+    pub(super) zeta: [f64; 3],
+    pub(super) sides: &'a SideForces,
+    /// ∫ f_B ψ for the hat functions ψ of the vertices.
+    pub(super) body: [Vector2<f64>; 3],
+}
+
+impl<const R: usize, const D: usize> Composite<R, D> {
+    /// ∫ σ : A⁻¹ σ as a bilinear form of the forces on both sides at the vertex i and of all forces, as in [`Self::ordered`], for a
+    /// [`Frame::metric`].
+    pub(super) fn form(&self, i: usize, metric: &Matrix3<f64>) -> SMatrix<f64, R, D> {
+        let [a, b, c, d, e, f] = &self.products[i];
+        let [p, q, r, s, t, u] = PAIRS.map(|at| metric[at]);
+        let mut form = SMatrix::zeros();
+        for k in 0..R * D {
+            form[k] = p * a[k] + q * b[k] + r * c[k] + s * d[k] + t * e[k] + u * f[k];
+        }
+        form
+    }
+
+    /// The numbers of all components of forces: those of the first and the last side of the vertex i, then the others.
+    fn order(i: usize) -> [usize; D] {
+        let side = D / 3 - 2;
+        let sides =
+            [i, (i + 2) % 3, (i + 1) % 3].into_iter().flat_map(|s| side * s..side * (s + 1));
+        let mut order = sides.chain(3 * side..D);
+        std::array::from_fn(|_| order.next().unwrap_or_default())
+    }
+
+    /// The forces on the reference triangle, in the order for the vertex i.
+    pub(super) fn ordered(
+        i: usize,
+        inverse: &Matrix2<f64>,
+        sides: &SideForces,
+        body: &[Vector2<f64>; 3],
+    ) -> SVector<f64, D> {
+        let sides = [i, (i + 2) % 3, (i + 1) % 3].into_iter().flat_map(|s| &sides[s][..D / 6 - 1]);
+        let mut forces = SVector::zeros();
+        for (k, force) in sides.chain(body).enumerate() {
+            let force = inverse * force;
+            (forces[2 * k], forces[2 * k + 1]) = (force.x, force.y);
+        }
+        forces
+    }
+
+    /// ∫ (ζA)⁻¹(τ − ζAε) : (τ − ζAε), N m per metre of thickness. Between the corners of the parts 1/ζ is replaced by its interpolation,
+    /// which is never smaller.
+    pub(super) fn square(&self, on: &LoadedTriangle) -> f64 {
+        let used = D / 6 - 1;
+        let forces = on.sides.iter().flat_map(|side| &side[..used]).chain(&on.body);
+        let forces = forces.flat_map(|force| <[f64; 2]>::from(on.frame.inverse * force));
+        let forces = SVector::<f64, D>::from_iterator(forces);
+        let mut errors = self.stresses * forces;
+        let Some((to_reference, compliance)) =
+            on.frame.to_physical.try_inverse().zip(on.d.try_inverse())
+        else {
+            return f64::INFINITY;
+        };
+        let metric = on.frame.metric(&compliance);
+        let stresses = on.strains.map(|strain| to_reference * (on.d * strain));
+        // 1/ζ ≤ its interpolation between the corners of a part.
+        let centre = 3.0 / on.zeta.iter().sum::<f64>();
+        let weights: [f64; POINTS] = std::array::from_fn(|q| {
+            let ((at, weight), [first, second, opposite]) = (self.points[q], corners_of(q));
+            let of_corners = [first, second].map(|i| (at[i] - at[opposite]) / on.zeta[i]);
+            weight * (of_corners.iter().sum::<f64>() + 3.0 * at[opposite] * centre)
+        });
+        for (q, (at, _)) in self.points.iter().enumerate() {
+            let zeta: f64 = at.iter().zip(on.zeta).map(|(l, zeta)| l * zeta).sum();
+            let stress = at.iter().zip(&stresses).map(|(l, stress)| stress * (l * zeta));
+            let mut error = errors.fixed_rows_mut::<3>(3 * q);
+            error -= stress.sum::<Vector3<f64>>();
+        }
+        let product = |a: &SVector<f64, VALUES>, b: &SVector<f64, VALUES>| -> f64 {
+            let at = |q: usize| a.fixed_rows::<3>(3 * q).dot(&(metric * b.fixed_rows::<3>(3 * q)));
+            weights.iter().enumerate().map(|(q, weight)| weight * at(q)).sum()
+        };
+        let square = product(&errors, &errors);
+        // The best parameters.
+        let count = self.free.len();
+        let gram = DMatrix::from_fn(count, count, |i, j| product(&self.free[i], &self.free[j]));
+        let work = DVector::from_fn(count, |i, _| product(&self.free[i], &errors));
+        let gain = gram.cholesky().map_or(0.0, |gram| work.dot(&gram.solve(&work)));
+        (square - gain).max(0.0)
+    }
+
+    /// The stress in part s, of the corners s and s + 1 and the centroid, is a polynomial of its barycentric coordinates. Its
+    /// coefficients solve the equations of the tractions, of their continuity and of the divergence, in least squares.
+    fn new(degree: usize) -> Self {
+        const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        const CENTRE: [f64; 2] = [1.0 / 3.0; 2];
+        let part = |s: usize| [CORNERS[s], CORNERS[(s + 1) % 3], CENTRE];
+        let (size, unknowns) =
+            (monomials(degree, [0.0; 3]).len(), 9 * monomials(degree, [0.0; 3]).len());
+        let index = |s: usize, i: usize, component: usize| 3 * (size * s + i) + component;
+        let (mut rows, mut forces) = (Vec::new(), Vec::new());
+        let mut equation = |row: DVector<f64>, force: DVector<f64>| {
+            rows.push(row.transpose());
+            forces.push(force.transpose());
+        };
+        // Adds `weight` times the component of τn in part s.
+        let add_traction = |row: &mut DVector<f64>,
+                            s: usize,
+                            at: [f64; 3],
+                            n: [f64; 2],
+                            of: usize,
+                            weight: f64| {
+            for (i, value) in monomials(degree, at).into_iter().enumerate() {
+                row[index(s, i, of)] += weight * value * n[of];
+                row[index(s, i, 2)] += weight * value * n[1 - of];
+            }
+        };
+        let normal = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| [by - ay, ax - bx];
+        for s in 0..3 {
+            let [a, b, _] = part(s);
+            for function in 0..=degree {
+                for of in 0..2 {
+                    let mut row = DVector::zeros(unknowns);
+                    for [r, weight] in THREE_GAUSS {
+                        let value = [1.0 - r, r, 4.0 * r * (1.0 - r)][function];
+                        add_traction(
+                            &mut row,
+                            s,
+                            [1.0 - r, r, 0.0],
+                            normal(a, b),
+                            of,
+                            weight * value,
+                        );
+                    }
+                    let mut force = DVector::zeros(D);
+                    force[2 * ((degree + 1) * s + function) + of] = 1.0;
+                    equation(row, force);
+                }
+            }
+            for place in 0..=degree {
+                let (r, n) = (place as f64 / degree as f64, normal(a, CENTRE));
+                for of in 0..2 {
+                    let mut row = DVector::zeros(unknowns);
+                    add_traction(&mut row, s, [1.0 - r, 0.0, r], n, of, 1.0);
+                    add_traction(&mut row, (s + 2) % 3, [0.0, 1.0 - r, r], n, of, -1.0);
+                    equation(row, DVector::zeros(D));
+                }
+            }
+            // −div τ is f_B, which has the given forces F_i at the hat functions, with |T| = ½. For k = 1 it is constant on
+            // each part: (4 Σ F − 9 F_i)/|T| on the part opposite to the corner i. For k = 2 it is affine: 3 (4 F_i − Σ F)/|T|
+            // at the corner i.
+            let gradients = *Triangle::new(part(s)).gradients();
+            let corner = |i: usize| [0, 1, 2].map(|j| f64::from(i == j));
+            let places = if degree == 1 {
+                vec![[1.0 / 3.0; 3]]
+            } else {
+                vec![corner(0), corner(1), corner(2)]
+            };
+            for at in places {
+                let here = Matrix3::from_columns(&part_corners(s)) * Vector3::from(at);
+                for of in 0..2 {
+                    let mut row = DVector::zeros(unknowns);
+                    for (i, slope) in derivatives(degree, at).into_iter().enumerate() {
+                        let [x, y] =
+                            [0, 1].map(|k| (0..3).map(|j| slope[j] * gradients[j][k]).sum::<f64>());
+                        row[index(s, i, of)] += [x, y][of];
+                        row[index(s, i, 2)] += [y, x][of];
+                    }
+                    let mut force = DVector::zeros(D);
+                    for i in 0..3 {
+                        let opposite = f64::from(i == (s + 2) % 3);
+                        let own =
+                            if degree == 1 { 4.0 - 9.0 * opposite } else { 12.0 * here[i] - 3.0 };
+                        force[6 * (degree + 1) + 2 * i + of] = -own / 0.5;
+                    }
+                    equation(row, force);
+                }
+            }
+        }
+        let (rows, forces) = (DMatrix::from_rows(&rows), DMatrix::from_rows(&forces));
+        let eigen = (rows.transpose() * &rows).symmetric_eigen();
+        let cut = 1e-10 * eigen.eigenvalues.max();
+        let inverse = eigen.eigenvalues.map(|value| if value > cut { 1.0 / value } else { 0.0 });
+        let basis = &eigen.eigenvectors;
+        let coefficients = basis
+            * DMatrix::from_diagonal(&inverse)
+            * (basis.transpose() * (rows.transpose() * forces));
+        let rule = rule();
+        let mut values = DMatrix::zeros(VALUES, unknowns);
+        for (q, (s, at, _)) in rule.iter().enumerate() {
+            for (i, value) in monomials(degree, *at).into_iter().enumerate() {
+                (0..3).for_each(|of| values[(3 * q + of, index(*s, i, of))] = value);
+            }
+        }
+        let mut stresses = &values * coefficients;
+        let free = (0..unknowns).filter(|&i| eigen.eigenvalues[i] <= cut);
+        let free = Vec::from_iter(free.map(|i| &values * basis.column(i)));
+        let weights = DVector::from_fn(VALUES, |i, _| rule[i / 3].2);
+        if !free.is_empty() {
+            // The smallest stresses of the family.
+            let free = DMatrix::from_columns(&free);
+            let weighted = DMatrix::from_fn(free.ncols(), VALUES, |i, j| free[(j, i)] * weights[j]);
+            if let Some(gram) = (&weighted * &free).cholesky() {
+                stresses -= &free * gram.solve(&(weighted * &stresses));
+            }
+        }
+        let product = |i: usize, j: usize| {
+            let rows =
+                |of: usize| DMatrix::from_fn(POINTS, D, |q, force| stresses[(3 * q + of, force)]);
+            let weighted = DMatrix::from_fn(POINTS, D, |q, force| {
+                weights[3 * q] * stresses[(3 * q + i, force)]
+            });
+            let product = weighted.transpose() * rows(j);
+            if i == j { product } else { &product + product.transpose() }
+        };
+        let products = PAIRS.map(|(i, j)| product(i, j));
+        let of_vertex = |i: usize| {
+            let order = Self::order(i);
+            products
+                .each_ref()
+                .map(|product| SMatrix::from_fn(|r, c| product[(order[r], order[c])]))
+        };
+        Self {
+            products: [0, 1, 2].map(of_vertex),
+            points: rule.map(|(s, at, weight)| {
+                (
+                    <[f64; 3]>::from(Matrix3::from_columns(&part_corners(s)) * Vector3::from(at)),
+                    weight,
+                )
+            }),
+            stresses: SMatrix::from_fn(|i, j| stresses[(i, j)]),
+            free: free.iter().map(|of| SVector::from_iterator(of.iter().copied())).collect(),
+        }
+    }
+}
+
+/// The first and second corner of the part in which the point q lies, and the corner opposite to it.
+fn corners_of(q: usize) -> [usize; 3] {
+    let s = q / (POINTS / 3);
+    [s, (s + 1) % 3, (s + 2) % 3]
+}
+
+/// The barycentric coordinates of the corners of part s in the triangle.
+fn part_corners(s: usize) -> [Vector3<f64>; 3] {
+    let corner = |i: usize| Vector3::from_fn(|j, _| f64::from(i == j));
+    [corner(s), corner((s + 1) % 3), Vector3::repeat(1.0 / 3.0)]
+}
+
+/// The monomials of a degree in barycentric coordinates.
+fn monomials(degree: usize, [a, b, c]: [f64; 3]) -> Vec<f64> {
+    if degree == 1 { vec![a, b, c] } else { vec![a * a, b * b, c * c, a * b, b * c, c * a] }
+}
+
+/// Their derivatives by the barycentric coordinates.
+fn derivatives(degree: usize, [a, b, c]: [f64; 3]) -> Vec<[f64; 3]> {
+    match degree {
+        1 => vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        _ => vec![
+            [2.0 * a, 0.0, 0.0],
+            [0.0, 2.0 * b, 0.0],
+            [0.0, 0.0, 2.0 * c],
+            [b, a, 0.0],
+            [0.0, c, b],
+            [c, 0.0, a],
+        ],
+    }
+}
+
+/// Radon's rule of seven points in each part: the part, barycentric coordinates in it, and the weight as a part of |T|.
+fn rule() -> [(usize, [f64; 3], f64); POINTS] {
+    let root = 15.0_f64.sqrt();
+    let orbits = [(6.0 - root, 155.0 - root), (6.0 + root, 155.0 + root)];
+    let mut rule = vec![([1.0 / 3.0; 3], 9.0 / 40.0)];
+    for (near, weight) in orbits {
+        let (l, weight) = (near / 21.0, weight / 1200.0);
+        let far = 1.0 - 2.0 * l;
+        rule.extend([[far, l, l], [l, far, l], [l, l, far]].map(|at| (at, weight)));
+    }
+    std::array::from_fn(|q| (q / 7, rule[q % 7].0, rule[q % 7].1 / 3.0))
+}

@@ -1,0 +1,354 @@
+//! A bound on the error of u that is proved.
+//!
+//! Let u_h be admissible (u_h = u_D on Γ_D, u_h·ν ≤ g on Γ_C), and τ a stress in equilibrium with the loads: −div τ = f_B,
+//! τn = f_N on Γ_N, and on Γ_C τn is the load there minus pν with p ≥ 0. Then, in the energy norm ‖v‖² = ∫ ζAε(v) : ε(v)
+//! (Prager and Synge, Quart. Appl. Math. 5, 1947; with contact Coorevits, Hild and Pelle, Comput. Methods Appl. Mech. Eng. 190, 2000),
+//!
+//! ‖u − u_h‖² ≤ ∫ (ζA)⁻¹(τ − ζAε(u_h)) : (τ − ζAε(u_h)) + 2 ∫_{Γ_C} p (g − u_h·ν).
+//!
+//! There is no constant and no guess in it. τ is made in four steps:
+//!
+//! 1. `pressure`: p ≥ 0 on Γ_C from the reactions at the nodes. Both are not the same forces at all nodes, so w with
+//!    K w = f − pν − K u_h corrects u_h.
+//! 2. `stars`: tractions on all sides that balance each triangle, from ζAε(u_h + w).
+//! 3. `airy`: better tractions, without new forces.
+//! 4. `composite`: the stress in each triangle from its tractions.
+
+mod airy;
+mod composite;
+mod pressure;
+mod stars;
+
+use super::recovery::at_vertices;
+use crate::{
+    ROUNDING,
+    evolution::ContactStep,
+    fem::{Body, for_elements},
+    mesh::{Order, sorted},
+    petsc::PetscError,
+    problem::{DiscreteProblem, State},
+    scene::{Condition, Expression},
+};
+use composite::{Frame, LoadedTriangle, SideForces};
+use nalgebra::{Vector2, Vector3};
+use pressure::{ContactEdge, Foundation};
+use rustc_hash::FxHashMap as HashMap;
+use stars::{BoundaryEdge, Star, StressedTriangle};
+
+/// A bound on the error of u in the energy norm.
+#[derive(Debug, Clone)]
+pub struct ProvedError {
+    /// The bound over ‖u_h‖.
+    pub relative: f64,
+    /// What the proof leaves out.
+    pub left_out: Vec<&'static str>,
+}
+
+/// A reason why there is no bound.
+pub type Unproved = &'static str;
+
+/// Forces without balance are rounding up to this fraction of all forces.
+///
+/// The stars of all scenes of the handbook are balanced to 1e-9.
+const BALANCED: f64 = 1e-7;
+/// A bound of this many times the estimate is good enough.
+const ENOUGH: f64 = 2.0;
+/// Another sweep over the stars pays if the last one has multiplied the square of the bound by less than this; and the most sweeps.
+///
+/// They serve stretched triangles and nearly incompressible materials, where a sweep halves the square, and no other scene
+/// needs a second one.
+const FALLS: f64 = 0.95;
+const MOST_SWEEPS: usize = 16;
+/// The residual of the correction w relative to its right-hand side.
+const CORRECTION: f64 = 1e-10;
+
+/// The nodes of an edge of the boundary in increasing order, the middle last, and its outward normal.
+type Side = ([Option<usize>; 3], Vector2<f64>);
+
+/// The bound for a state of the problem of `contact_step`, which solves for the correction. The tractions are improved while the
+/// bound is far above the relative `estimate` of the error. Collective.
+pub(crate) fn proved_error(
+    contact_step: &mut ContactStep,
+    state: &State,
+    estimate: f64,
+) -> Result<Result<ProvedError, Unproved>, PetscError> {
+    let problem = contact_step.problem();
+    let (body, terms) = (&problem.body, &problem.terms);
+    let (partition, points) = (&body.nodes.partition, problem.zeta_at_points(&state.zeta));
+    let comm = partition.comm();
+    let energy = |u: &[f64]| comm.total(terms.energy(body, &points, u));
+    let size = energy(&problem.strained(state).u);
+    if comm.any(is_curved(body)) {
+        return Ok(Err("sides are curved"));
+    }
+    if size <= 0.0 {
+        return Ok(Err("nothing is deformed"));
+    }
+    // The pressure, and an admissible u_h.
+    let sides = sides(body);
+    let mut foundations = Foundation::all(problem, state, &sides);
+    let load = problem.load(state.time);
+    if !pressure::balance(problem, &mut foundations, &load) {
+        return Ok(Err("no pressure on the edges balances the loads"));
+    }
+    let edges = foundations.into_iter().flat_map(|foundation| foundation.edges);
+    let mut edges = Vec::from_iter(edges);
+    let mut moved = vec![0.0; state.u.len()];
+    edges.iter_mut().for_each(|edge| edge.admit(&mut moved));
+    partition.update(&mut moved, 2)?;
+    let admitted: Vec<f64> = state.u.iter().zip(&moved).map(|(u, v)| u + v).collect();
+    // The correction w.
+    let contact = pressure::nodal_forces(problem, &edges);
+    let internal = terms.internal_force(body, &points, &state.u);
+    let rest = load.iter().zip(&contact).zip(&internal).map(|((f, p), k)| f + p - k).collect();
+    let held = contact_step.holding();
+    let (_, w) = contact_step.corrected(&points, rest, &held, CORRECTION)?;
+    let corrected: Vec<f64> = state.u.iter().zip(&w).map(|(u, w)| u + w).collect();
+    // The tractions.
+    let zeta = Vec::from_iter(state.zeta.iter().map(|zeta| problem.truncated(*zeta)));
+    let triangles = stressed(problem, [&points, &zeta], &corrected, state.time);
+    let boundary = boundary(problem, &edges, &sides, state.time);
+    let stars = Star::all(&triangles, partition.owned());
+    let found = stars.as_ref().and_then(|stars| stars::tractions(&triangles, stars, &boundary));
+    if comm.any(found.is_none()) {
+        return Ok(Err("parts of the body touch in a point"));
+    }
+    let (parts, imbalance) = found.unwrap_or_default();
+    let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
+    if comm.total(imbalance).sqrt() > BALANCED * forces {
+        return Ok(Err("the stiffness is ill-conditioned"));
+    }
+    let mut tractions = summed(body, &parts);
+    for (sides, triangle) in tractions.iter_mut().zip(&triangles) {
+        (0..3).for_each(|s| sides[s][2] = triangle.bubble(s, (s + 1) % 3));
+    }
+    let stars = stars.unwrap_or_default();
+    // The stresses, with better tractions as long as these pay.
+    let strains = body.strains(&admitted);
+    let per_triangle = strains.len() / body.triangles.len();
+    let square = |tractions: &[SideForces], t: usize| {
+        let triangle = LoadedTriangle {
+            frame: Frame::new(triangles[t].corners),
+            d: terms.elasticity.d(body, t),
+            strains: at_vertices(&strains[per_triangle * t..per_triangle * (t + 1)]),
+            zeta: body.mesh.triangles[t].map(|vertex| zeta[vertex]),
+            sides: &tractions[t],
+            body: triangles[t].body,
+        };
+        match body.order() {
+            Order::Linear => composite::LINEAR.square(&triangle),
+            Order::Quadratic => composite::QUADRATIC.square(&triangle),
+        }
+    };
+    let contact = comm.total(2.0 * edges.iter().map(ContactEdge::work).sum::<f64>());
+    let of_moved = energy(&moved).max(0.0).sqrt();
+    let known = (&triangles[..], &stars[..], &boundary);
+    let mut before = f64::INFINITY;
+    for sweep in 1.. {
+        let mut better = tractions.clone();
+        match body.order() {
+            Order::Linear => airy::improve::<8, 18, 5>(&composite::LINEAR, known, &mut better),
+            Order::Quadratic => {
+                airy::improve::<12, 24, 9>(&composite::QUADRATIC, known, &mut better)
+            }
+        }
+        tractions = joined(body, tractions, better);
+        let own: f64 = (0..body.own_triangles).map(|t| square(&tractions, t)).sum();
+        let all = comm.total(own);
+        let relative = ((all + contact).sqrt() + of_moved) / size.sqrt();
+        if relative <= ENOUGH * estimate || all > FALLS * before || sweep == MOST_SWEEPS {
+            return Ok(Ok(ProvedError { relative, left_out: left_out(problem, state.time) }));
+        }
+        before = all;
+    }
+    unreachable!("the last sweep returns")
+}
+
+/// Has the body curved sides?
+fn is_curved(body: &Body) -> bool {
+    let points = &body.nodes.points;
+    let bends = |nodes: &[usize; 6]| {
+        [[0, 1, 3], [1, 2, 4], [2, 0, 5]].iter().any(|side| {
+            let [a, b, middle] = side.map(|i| Vector2::from(points[nodes[i]]));
+            (middle - 0.5 * (a + b)).norm() > ROUNDING * (b - a).norm()
+        })
+    };
+    body.quadratic_nodes().is_some_and(|nodes| nodes.iter().any(bends))
+}
+
+/// The sides of the triangles that belong to no other triangle, by their ends in increasing order.
+fn sides(body: &Body) -> HashMap<[usize; 2], Side> {
+    let points = &body.nodes.points;
+    let mut sides = HashMap::<[usize; 2], Option<Side>>::default();
+    for_elements!(body, cells => for nodes in cells.nodes {
+        for s in 0..3 {
+            let (a, b) = (nodes[s], nodes[(s + 1) % 3]);
+            let along = Vector2::from(points[b]) - Vector2::from(points[a]);
+            let normal = Vector2::new(along.y, -along.x).normalize();
+            let [first, last] = sorted([a, b]);
+            let side = ([Some(first), Some(last), nodes.get(3 + s).copied()], normal);
+            sides.entry([first, last]).and_modify(|known| *known = None).or_insert(Some(side));
+        }
+    });
+    sides.into_iter().filter_map(|(ends, side)| Some((ends, side?))).collect()
+}
+
+/// The triangles with stresses that have the same forces at the nodes as those of the stiffness matrix: affine between the vertices
+/// or the quadrature points.
+fn stressed(
+    problem: &DiscreteProblem,
+    [zeta_at_points, zeta_at_vertices]: [&[f64]; 2],
+    u: &[f64],
+    time: f64,
+) -> Vec<StressedTriangle> {
+    let (body, elasticity) = (&problem.body, &problem.terms.elasticity);
+    let loads = problem.loads.by_elements(body, time);
+    let strains = body.strains(u);
+    let per_triangle = strains.len() / body.triangles.len();
+    let vertices = body.node_of_vertex();
+    let of_triangle = |t: usize| {
+        let own = per_triangle * t..per_triangle * (t + 1);
+        let (d, zeta) = (elasticity.d(body, t), &zeta_at_points[own.clone()]);
+        let stresses =
+            strains[own.clone()].iter().zip(zeta).map(|(strain, zeta)| d * strain * *zeta);
+        let mean = zeta.iter().sum::<f64>() / per_triangle as f64;
+        let load = loads.triangles[t].map(Vector2::from);
+        let triangle = body.mesh.triangles[t];
+        let stresses = match &strains[own] {
+            // With a constant strain, σ_h is affine and has the same mean.
+            [strain] => triangle.map(|vertex| d * strain * zeta_at_vertices[vertex]),
+            _ => at_vertices(&stresses.collect::<Vec<Vector3<f64>>>()),
+        };
+        StressedTriangle {
+            nodes: triangle.map(|vertex| vertices[vertex]),
+            corners: triangle.map(|vertex| body.mesh.nodes[vertex].into()),
+            gradients: *body.triangles[t].gradients(),
+            area: body.triangles[t].area(),
+            stresses,
+            flexibility: 1.0 / (d[(2, 2)] * mean),
+            compliance: d.try_inverse().unwrap_or_default() / mean,
+            // ψ = φ + half of the bubbles of both sides.
+            body: [0, 1, 2].map(|i| load[i] + 0.5 * (load[3 + i] + load[3 + (i + 2) % 3])),
+            bubbles: [load[3], load[4], load[5]],
+        }
+    };
+    (0..body.triangles.len()).map(of_triangle).collect()
+}
+
+/// What is known on the edges of the boundary.
+fn boundary(
+    problem: &DiscreteProblem,
+    edges: &[ContactEdge],
+    sides: &HashMap<[usize; 2], Side>,
+    time: f64,
+) -> HashMap<[usize; 2], BoundaryEdge> {
+    let body = &problem.body;
+    let vertices = body.node_of_vertex();
+    let mut boundary: HashMap<[usize; 2], BoundaryEdge> =
+        sides.keys().map(|ends| (*ends, BoundaryEdge::default())).collect();
+    for (ends, load) in problem.loads.by_elements(body, time).edges {
+        let [a, b, middle] = load.map(Vector2::from);
+        let Some(edge) = boundary.get_mut(&ends) else { continue };
+        edge.forces = [a + 0.5 * middle, b + 0.5 * middle];
+    }
+    for contact in edges {
+        let (ends, [a, b]) = contact.forces();
+        let Some(edge) = boundary.get_mut(&ends) else { continue };
+        edge.forces = [edge.forces[0] + a, edge.forces[1] + b];
+    }
+    for part in &problem.scene().boundaries {
+        for edge in body.mesh.edges_of(&part.name) {
+            let ends = sorted(edge.map(|vertex| vertices[vertex]));
+            let (Some(known), Some((_, normal))) = (boundary.get_mut(&ends), sides.get(&ends))
+            else {
+                continue;
+            };
+            for condition in &part.conditions {
+                match condition {
+                    Condition::Displacement([x, y]) => {
+                        known.supported.extend(x.as_ref().map(|_| Vector2::x()));
+                        known.supported.extend(y.as_ref().map(|_| Vector2::y()));
+                    }
+                    Condition::Symmetry => known.supported.push(*normal),
+                    Condition::Gap(_) | Condition::Load(_) => {}
+                }
+            }
+        }
+    }
+    boundary
+}
+
+/// The sum of the parts of the forces that all ranks have. Collective.
+fn summed(body: &Body, parts: &[SideForces]) -> Vec<SideForces> {
+    let comm = body.nodes.partition.comm();
+    if comm.is_serial() {
+        return parts.to_vec();
+    }
+    let last = body.global_triangles.iter().copied().max().unwrap_or(0);
+    let mut all = vec![[0.0; 18]; comm.max(last as f64) as usize + 1];
+    for (sides, &triangle) in parts.iter().zip(&body.global_triangles) {
+        let parts = sides.as_flattened().iter().flat_map(|force| <[f64; 2]>::from(*force));
+        all[triangle].iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+    }
+    comm.sum(all.as_flattened_mut());
+    let of_triangle = |&triangle: &usize| {
+        let forces = &all[triangle];
+        std::array::from_fn(|s| {
+            std::array::from_fn(|k| Vector2::new(forces[6 * s + 2 * k], forces[6 * s + 2 * k + 1]))
+        })
+    };
+    body.global_triangles.iter().map(of_triangle).collect()
+}
+
+/// Tractions with the changes that the ranks have made to those of their stars. Collective.
+fn joined(body: &Body, before: Vec<SideForces>, after: Vec<SideForces>) -> Vec<SideForces> {
+    if body.nodes.partition.comm().is_serial() {
+        return after;
+    }
+    let of = |(a, b): (&SideForces, &SideForces), factor: f64| {
+        std::array::from_fn(|s| std::array::from_fn(|k| a[s][k] + factor * b[s][k]))
+    };
+    let changes = Vec::from_iter(after.iter().zip(&before).map(|pair| of(pair, -1.0)));
+    before.iter().zip(&summed(body, &changes)).map(|pair| of(pair, 1.0)).collect()
+}
+
+/// What the proof leaves out: functions of the scene that are no polynomials of the degrees that it takes, along the sides of
+/// the triangles. Collective.
+fn left_out(problem: &DiscreteProblem, time: f64) -> Vec<&'static str> {
+    let (body, scene) = (&problem.body, problem.scene());
+    let degree = if body.order() == Order::Quadratic { 2 } else { 1 };
+    let point = |vertex: usize| Vector2::from(body.mesh.nodes[vertex]);
+    // Differences of one more order than the degree, which vanish for a polynomial.
+    let differs = |f: &Expression, ends: [usize; 2], degree: usize| {
+        let weights: &[f64] =
+            [&[1.0, -1.0][..], &[1.0, -2.0, 1.0], &[1.0, -3.0, 3.0, -1.0]][degree];
+        let values = Vec::from_iter((0..=degree + 1).map(|k| {
+            let s = k as f64 / (degree + 1) as f64;
+            let x = point(ends[0]) * (1.0 - s) + point(ends[1]) * s;
+            f.eval(x.x, x.y, time)
+        }));
+        let size = values.iter().fold(0.0, |most, value| f64::max(most, value.abs()));
+        values.iter().zip(weights).map(|(value, w)| value * w).sum::<f64>().abs() > 1e-8 * size
+    };
+    let (mut loads, mut values) = (false, false);
+    for force in scene.body_force.iter().filter(|force| force.depends_on_space()) {
+        let mut sides = body.mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c]]);
+        loads |= sides.any(|ends| differs(force, ends, degree - 1));
+    }
+    for part in &scene.boundaries {
+        for condition in &part.conditions {
+            let functions = condition.expressions().into_iter().flatten();
+            for function in functions.filter(|function| function.depends_on_space()) {
+                let mut edges = body.mesh.edges_of(&part.name).iter();
+                let found = edges.any(|&ends| differs(function, ends, degree));
+                *(if condition.is_support() { &mut values } else { &mut loads }) |= found;
+            }
+        }
+    }
+    let comm = body.nodes.partition.comm();
+    let parts = [
+        (loads, "loads vary within triangles"),
+        (values, "gaps or displacements vary between nodes"),
+    ];
+    parts.into_iter().filter_map(|(found, name)| comm.any(found).then_some(name)).collect()
+}

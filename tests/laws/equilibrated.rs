@@ -1,0 +1,224 @@
+//! The proved bound on the error of u: never below the true error, and not far above it.
+//!
+//! The true error is that against the answer of second order on the mesh bisected twice, with the same ζ. The study
+//! `validation/bounds.py` has many more scenes.
+
+use crate::support::{ORDERS, distorted, layered, problem, square, unstructured};
+use signorini::{
+    estimate::Simulation,
+    evolution::{Choices, ContactStep, Phases, State},
+    fem::{Body, Location},
+    mesh::{Mesh, Order, Refinement},
+    petsc::Session,
+    problem::DiscreteProblem,
+};
+
+/// ‖v‖² of nodal v.
+fn square_norm(problem: &DiscreteProblem, zeta: &[f64], v: &[f64]) -> f64 {
+    let zeta = problem.zeta_at_points(zeta);
+    problem.terms.elasticity.energies(&problem.body, &zeta, v).iter().sum()
+}
+
+/// The true error of a state, relative, in the energy norm.
+fn true_error(problem: &DiscreteProblem, state: &State) -> f64 {
+    let (body, mut finer) = (&problem.body, Refinement::start(problem.body.mesh.clone()));
+    let (mut zeta, mut parents) = (state.zeta.clone(), Vec::from_iter(0..body.triangles.len()));
+    for _ in 0..2 {
+        finer = finer.refine_everywhere().unwrap();
+        parents = finer.parent_of_triangle.iter().map(|&parent| parents[parent]).collect();
+        let mean = |&[a, b]: &[usize; 2]| 0.5 * (zeta[a] + zeta[b]);
+        let new = Vec::from_iter(finer.halved_edges.iter().map(mean));
+        zeta.extend(new);
+    }
+    let mut scene = problem.scene().clone();
+    scene.order = Order::Quadratic;
+    let fine = DiscreteProblem::new(scene, finer.mesh).unwrap();
+    let session = Session::start(&[]).unwrap();
+    let (choices, phases) = (Choices::of(fine.scene()), Phases::default());
+    let mut step = ContactStep::new(&session, &fine, &choices, &phases).unwrap();
+    let exact = step.solve(0, state.time, &zeta).unwrap().state.u;
+    let difference = difference(body, &state.u, &fine.body, &parents, &exact);
+    let own = square_norm(problem, &state.zeta, &state.u);
+    (square_norm(&fine, &zeta, &difference) / own).sqrt()
+}
+
+/// `exact` − u at the nodes of a finer body, whose triangles lie in those of `parents`.
+fn difference(body: &Body, u: &[f64], finer: &Body, parents: &[usize], exact: &[f64]) -> Vec<f64> {
+    let (mut difference, zeta) = (exact.to_vec(), vec![1.0; body.mesh.nodes.len()]);
+    for (nodes, &parent) in finer.quadratic_nodes().unwrap().iter().zip(parents) {
+        let from = body.mesh.nodes[body.mesh.triangles[parent][0]];
+        let gradients = body.triangles[parent].gradients();
+        for &node in nodes {
+            let [dx, dy] = [0, 1].map(|k| finer.nodes.points[node][k] - from[k]);
+            let part = |i: usize| gradients[i][0] * dx + gradients[i][1] * dy;
+            let barycentric = [1.0 + part(0), part(1), part(2)];
+            let at = Location { triangle: parent, barycentric };
+            let own = at.values(body, parent, u, &zeta).u;
+            (0..2).for_each(|k| difference[2 * node + k] = exact[2 * node + k] - own[k]);
+        }
+    }
+    difference
+}
+
+/// The proved bound of a scene, with the true error.
+fn errors(mesh: Mesh, text: &str) -> [f64; 2] {
+    let problem = problem(mesh, text).unwrap_or_else(|e| panic!("{e}"));
+    let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
+    let errors = &outcome.errors;
+    let bound = errors.displacement_bound.unwrap_or_else(|| panic!("{:?}", errors.reservations));
+    [bound, true_error(&problem, &outcome.last.state)]
+}
+
+/// Is the bound at least the error, and at most `most` times as large?
+fn bounds(mesh: Mesh, text: &str, most: f64) {
+    for order in 1..=2 {
+        let text = format!("discretisation.displacement = {order}\n{text}");
+        let [bound, truth] = errors(mesh.clone(), &text);
+        println!("P{order}: {bound:.4} proved, {truth:.4} true, ratio {:.3}", bound / truth);
+        assert!(bound >= truth * (1.0 - 1e-9), "{bound} < {truth}\n{text}");
+        assert!(bound <= most * truth, "{bound} > {most} × {truth}\n{text}");
+    }
+}
+
+#[test]
+fn it_is_rounding_where_the_element_has_the_exact_answer() {
+    // Uniform tension, and pressure on a foundation between a clamp's side and a free one.
+    let pulled = "material = { young = 3, poisson = 0.3, plane = 'strain' }
+         boundary = [
+            { name = 'left', symmetry = true },
+            { name = 'bottom', gap = 0 },
+            { name = 'top', traction = [0, -0.1] },
+         ]";
+    for mesh in [square(3), distorted(4), unstructured(0.2)] {
+        for degree in 1..=2 {
+            let text = format!("discretisation.displacement = {degree}\n{pulled}");
+            let problem = problem(mesh.clone(), &text).unwrap();
+            let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
+            let bound = outcome.errors.displacement_bound.unwrap();
+            assert!(bound < 1e-7, "P{degree}, {} triangles: {bound:e}", mesh.triangles.len());
+        }
+    }
+}
+
+#[test]
+fn it_is_above_the_error_of_clamped_bodies_with_loads_of_all_kinds() {
+    let scene = |more: &str| {
+        format!(
+            "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             {more}"
+        )
+    };
+    let clamped = "boundary = [
+            { name = 'left', displacement = [0, 0] },
+            { name = 'right', traction = [1, 0.3] },
+         ]";
+    for mesh in [square(4), distorted(5), unstructured(0.2)] {
+        bounds(mesh, &scene(clamped), 2.0);
+    }
+    // A body force, a pressure, an axis, and a side that slides along an inclined wall.
+    let others = "body = { force = [0.5, -1] }
+         boundary = [
+            { name = 'left', symmetry = true },
+            { name = 'top', pressure = 0.4 },
+            { name = 'right', displacement = ['free', 0.01] },
+         ]";
+    bounds(distorted(5), &scene(others), 2.0);
+}
+
+#[test]
+fn it_is_above_the_error_with_contact() {
+    let pressed = |foundation: &str, right: &str| {
+        format!(
+            "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'bottom', {foundation} }},
+                {{ name = 'right', {right} }},
+             ]"
+        )
+    };
+    for (foundation, right, most) in [
+        ("gap = 0", "traction = [0.5, -1]", 2.5),
+        ("gap = 0.004", "traction = [0, -1]", 2.5),
+        ("gap = 0, normal = [0.1, -1]", "traction = [0.5, -1]", 2.5),
+        // The gap is affine, and the body touches at one corner.
+        ("gap = '0.01*(1 - x)'", "traction = [0, -0.2]", 4.0),
+    ] {
+        bounds(distorted(6), &pressed(foundation, right), most);
+    }
+    // Contact alone holds the body.
+    let loose = "material = { young = 100, poisson = 0.3, plane = 'stress' }
+         boundary = [
+            { name = 'left', gap = 0 },
+            { name = 'bottom', gap = 0 },
+            { name = 'top', traction = [0, -1] },
+            { name = 'right', traction = [-0.4, 0] },
+         ]
+         body = { force = [0, '-0.3'] }";
+    bounds(distorted(5), loose, 4.0);
+}
+
+#[test]
+fn materials_and_compressibility_and_damage_do_not_break_it() {
+    let clamped = |material: &str, more: &str| {
+        format!(
+            "material = {{ {material} }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'right', traction = [0.4, -1] }},
+             ]
+             {more}"
+        )
+    };
+    for poisson in ["0", "0.49", "0.4999", "0.499999"] {
+        let material = format!("young = 100, poisson = {poisson}, plane = 'strain'");
+        bounds(distorted(5), &clamped(&material, ""), 6.0);
+    }
+    for contrast in ["1e-3", "1e3", "1e6"] {
+        let material =
+            format!("young = 1, poisson = 0.3, plane = 'stress', upper.young = {contrast}");
+        let text = clamped(&material, "").replace("[0.4, -1]", "[1e-3, 0]");
+        bounds(layered(Mesh::rectangle(1.0, 1.0, 6, 6)), &text, 4.0);
+    }
+    // ζ from its threshold to 1: the damage stays as it begins.
+    let damage = "[damage]
+         diffusion = 1e-9
+         lambda_d = 0
+         lambda_u = 0
+         lambda_w = 0
+         strain_cap = 1
+         threshold = 0.01
+         initial = '0.02 + 0.98*x'
+         [time]
+         end = 1e-6
+         step = 1e-6";
+    let material = "young = 100, poisson = 0.3, plane = 'stress'";
+    bounds(square(5), &clamped(material, damage), 3.0);
+}
+
+#[test]
+fn what_the_proof_leaves_out_is_named() {
+    let scene = |force: &str, gap: &str| {
+        format!(
+            "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'bottom', gap = '{gap}' }},
+                {{ name = 'right', traction = [0, '{force}'] }},
+             ]"
+        )
+    };
+    for (force, gap, named) in [
+        ("-1", "0", &[][..]),
+        ("-1 - y", "0.001*x", &[]),
+        ("-exp(3*y)", "0", &["loads vary within triangles"]),
+        ("-1", "0.01*x^3", &["gaps or displacements vary between nodes"]),
+    ] {
+        for order in ORDERS {
+            let text = format!("discretisation.displacement = {}\n", order as usize + 1);
+            let problem = problem(square(4), &(text + &scene(force, gap))).unwrap();
+            let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
+            assert_eq!(outcome.errors.reservations, named, "{force}, {gap}");
+        }
+    }
+}
