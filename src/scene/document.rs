@@ -10,7 +10,7 @@ use serde::{Deserialize, de::IntoDeserializer};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{MOST_SHOWN, SceneError};
+use super::error::SceneError;
 use super::schema::is_key;
 use crate::suggestion::suggestion;
 
@@ -21,6 +21,9 @@ pub(super) fn absolute(file: &Path) -> PathBuf {
 
 /// The tables that are lists.
 const LISTS: [&str; 2] = ["boundary", "probe"];
+
+/// The largest number of problems that are reported at once.
+const MOST_SHOWN: usize = 20;
 
 /// The place of a problem and the message.
 pub(super) type Problem = (Range<usize>, String);
@@ -93,12 +96,9 @@ impl SceneText {
     /// An error that lists the `problems` in the order of the file, if there are any.
     pub(super) fn refuse(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
         problems.sort_by_key(|(place, _)| (place.start, place.end));
-        // The others are only counted.
-        let report = |(n, (place, message)): (usize, &Problem)| match n < MOST_SHOWN {
-            true => self.report(place, message),
-            false => message.clone(),
-        };
-        let mut reports: Vec<String> = problems.iter().enumerate().map(report).collect();
+        problems.truncate(MOST_SHOWN);
+        let report = |(place, message): &Problem| self.report(place, message);
+        let mut reports: Vec<String> = problems.iter().map(report).collect();
         let Some(last) = reports.last_mut() else { return Ok(()) };
         // A line of the file may contradict an argument of the command line.
         let of_the_file = |(place, _): &Problem| place.start < self.stride;
@@ -120,15 +120,17 @@ impl SceneText {
         format!("{problem}\n{lines}")
     }
 
+    /// The number of the line that contains the byte `at`.
+    fn line(&self, at: usize) -> usize {
+        self.file.bytes().take(at).filter(|byte| *byte == b'\n').count() + 1
+    }
+
     /// The file and the line, or the file and the `--set` argument.
     pub(super) fn in_words(&self, place: &Range<usize>) -> String {
         let path = self.path.display();
         match place.start / self.stride {
             _ if *place == NOWHERE => path.to_string(),
-            0 => {
-                let before = self.file.bytes().take(place.start);
-                format!("{path}:{}", before.filter(|byte| *byte == b'\n').count() + 1)
-            }
+            0 => format!("{path}:{}", self.line(place.start)),
             set => format!("{path}, --set {}", self.sets[set - 1]),
         }
     }
@@ -144,56 +146,15 @@ impl SceneText {
         toml::Table::deserialize(root).unwrap_or_default()
     }
 
-    /// The line that contains the byte `at`, and its first byte.
-    fn line(&self, at: usize) -> Option<(usize, &str)> {
-        let start = self.file.get(..at)?.rfind('\n').map_or(0, |end| end + 1);
-        Some((start, self.file[start..].lines().next()?))
-    }
-
-    /// Advice for a line that is not TOML. The line contains the byte `at`.
-    fn hint(&self, at: usize) -> &'static str {
-        let (_, line) = self.line(at).unwrap_or_default();
-        let Some((_, value)) = line.split_once('=') else { return "" };
-        // Without texts in quotes, between blanks.
-        let bare = format!(" {} ", value.split('"').step_by(2).collect::<String>());
-        let is_open = |c: &[u8]| c[1] == b'.' && !(c[0].is_ascii_digit() && c[2].is_ascii_digit());
-        if bare.as_bytes().windows(3).any(is_open) {
-            "; a number has digits before and after its point, as in 0.5"
-        } else if bare.contains(|c: char| c.is_alphabetic() || "*/^".contains(c)) {
-            "; expressions and texts stand in quotes"
-        } else {
-            ""
-        }
-    }
-
     /// The problem of a key at `place` that the file has above already, perhaps in another form.
     fn given_twice(&self, place: &Range<usize>) -> String {
-        let (start, line) = self.line(place.start).unwrap_or_default();
         let key = self.file.get(place.clone()).unwrap_or_default();
-        let rest = line.get(place.end - start..).unwrap_or_default().trim_start();
-        match (line.trim_start().starts_with('['), rest.starts_with(']')) {
-            _ if LISTS.contains(&key) => format!("{key} is a list, each begins with [[{key}]]"),
-            (false, _) => format!("{key} is given above already; keep one"),
-            (true, true) => format!(
-                "{key} is given above already; merge the two, or give a surface another name than a key"
+        match LISTS.contains(&key) {
+            true => format!("{key} is a list, each begins with [[{key}]]"),
+            false => format!(
+                "{key} is given above already; keep one, merge two tables, or give a surface another name"
             ),
-            (true, false) => format!("{key} = … stands above; write it as a table [{key}] there"),
         }
-    }
-
-    /// The problem of a decimal comma (`1,5`) in the line that contains the byte `at`.
-    fn decimal_comma(&self, at: usize) -> Option<Problem> {
-        let (start, line) = self.line(at)?;
-        line.match_indices('=').find_map(|(equals, _)| {
-            let value = line[equals + 1..].trim_start();
-            let length = with_decimal_comma(value)?;
-            let key = line[..equals].trim_end().rsplit(['{', ',', ' ']).next()?;
-            let from = start + line.len() - value.len();
-            let number = &value[..length];
-            let mended = number.replace(',', ".");
-            let problem = format!("{key} is {number}: write a decimal point, {key} = {mended}");
-            Some((from..from + length, problem))
-        })
     }
 
     /// Parses the file and inserts the `--set` arguments in their order.
@@ -204,20 +165,21 @@ impl SceneText {
         };
         let syntax = |error: &toml::de::Error| {
             let place = error.span().unwrap_or(NOWHERE);
-            if is_duplicate(error) {
-                return (place.clone(), self.given_twice(&place));
-            }
-            self.decimal_comma(place.start).unwrap_or_else(|| {
-                let hint = self.hint(place.start);
-                (place, format!("not valid TOML: {}{hint}", error.message()))
-            })
+            let problem = match is_duplicate(error) {
+                true => self.given_twice(&place),
+                false => format!(
+                    "not valid TOML: {}; write numbers as 0.5, and expressions and texts in quotes",
+                    error.message()
+                ),
+            };
+            (place, problem)
         };
         // After an unclosed table, keys seem to be duplicates.
         let all = errors.first().is_none_or(is_duplicate);
         let reported = errors.iter().filter(|error| all || !is_duplicate(error));
         let mut problems: Vec<Problem> = reported.map(syntax).collect();
-        // Several errors in a line may follow from one comma.
-        problems.dedup();
+        // Further errors in a line follow from the first one.
+        problems.dedup_by_key(|(place, _)| self.line(place.start));
         self.refuse(problems)?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
@@ -295,16 +257,6 @@ impl SceneText {
         }
         Ok(())
     }
-}
-
-/// The length of a number with a decimal comma at the start of a text, like `-1,5e3`.
-pub(super) fn with_decimal_comma(text: &str) -> Option<usize> {
-    let end = text.find(|c: char| !c.is_ascii_alphanumeric() && !"+-.,_".contains(c));
-    let number = text[..end.unwrap_or(text.len())].trim_end_matches(',');
-    let (whole, rest) = number.split_once(',')?;
-    let is_number = whole.parse::<i64>().is_ok() && rest.starts_with(|c: char| c.is_ascii_digit());
-    let mended = format!("{whole}.{rest}");
-    (is_number && mended.parse::<f64>().is_ok()).then_some(number.len())
 }
 
 /// The last place of a value and of the values in it.

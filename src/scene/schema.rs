@@ -1,7 +1,7 @@
 //! Reads the values of a scene file by the JSON schema of scenes, key by key. Here alone a number, or an expression of
 //! constants in its place, is read. The problems are collected, so that one message lists all problems of a scene.
 
-use super::document::{NOWHERE, Problem, SceneText, below, name_of, with_decimal_comma};
+use super::document::{NOWHERE, Problem, SceneText, below, name_of};
 use super::expression::{Expression, NOT_CONSTANT, Scope, WITHOUT_VALUE, refused_name};
 use crate::suggestion::suggestion;
 use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
@@ -292,13 +292,10 @@ fn read_value(value: &Value, schema: &Schema, scope: &Scope) -> Result<Value, St
     let found = match value {
         Value::Array(_) | Value::Table(_) => String::new(),
         Value::Float(number) => format!(", but is {number:?}"),
-        Value::String(text) if with_decimal_comma(text) == Some(text.len()) => {
-            format!(", but is {value}: write a decimal point")
-        }
         Value::String(text)
             if text.contains(',') && text.split(',').all(|part| part.parse::<f64>().is_ok()) =>
         {
-            format!(", but is {value}: `signorini study` runs several values")
+            format!(", but is {value}: write a decimal point; `signorini study` runs several values")
         }
         _ => match evaluated.filter(|_| value.is_str()) {
             Some(Ok(number)) => format!(", but is {value} = {number:?}"),

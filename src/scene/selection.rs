@@ -1,7 +1,10 @@
 //! Boundaries that a scene selects by their place, with `where`.
 
 use super::{Scene, SceneError, check::boundary_key};
-use crate::mesh::{Curve, Mesh, bounds};
+use crate::{
+    fem::parabola,
+    mesh::{Curve, Mesh, bounds},
+};
 use std::collections::BTreeSet;
 
 /// The number of parts of an edge in which `where` must agree.
@@ -20,12 +23,8 @@ impl Scene {
             let Some(selection) = &boundary.selection else { continue };
             let key = boundary_key(&boundary.name, "where");
             problems.extend(self.check(&key, selection, &middles, &[0.0], ("", &|_| true)));
-            // The quadratic shape functions of the ends and of the midpoint.
             let is_true = |&[a, b]: &[usize; 2], s: f64| {
-                let shapes =
-                    [(1.0 - s) * (1.0 - 2.0 * s), s * (2.0 * s - 1.0), 4.0 * s * (1.0 - s)];
-                let points = [mesh.nodes[a], mesh.nodes[b], mesh.midpoint([a, b])];
-                let [x, y] = [0, 1].map(|k| (0..3).map(|i| shapes[i] * points[i][k]).sum());
+                let [x, y] = parabola([mesh.nodes[a], mesh.midpoint([a, b]), mesh.nodes[b]], s);
                 selection.eval(x, y, 0.0) != 0.0
             };
             let is_cut = |edge: &&[usize; 2]| {

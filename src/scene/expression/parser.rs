@@ -54,6 +54,8 @@ const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
     ("/", Binary(|a, b| a / b, interval::quotient), 5, 6),
     ("^", Binary(f64::powf, interval::power), 6, 6),
 ];
+/// What may follow a number, in messages.
+const AN_OPERATOR: &str = "a decimal point, an operator (`*`, `^`, `==`, `and`, `or`, …)";
 /// The precedence of a sign. Only `^` has a higher one: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;
 
@@ -102,9 +104,7 @@ impl<'a> Parser<'a> {
         }
         self.expression(1)?;
         match self.peek() {
-            Some(_) => {
-                Err(self.unexpected("an operator (a product is written with `*`) or the end"))
-            }
+            Some(_) => Err(self.unexpected(&format!("{AN_OPERATOR} or the end"))),
             None => Ok(()),
         }
     }
@@ -262,7 +262,7 @@ impl<'a> Parser<'a> {
         if self.take(")") {
             Ok(())
         } else {
-            Err(self.unexpected("an operator (a product is written with `*`) or `)`"))
+            Err(self.unexpected(&format!("{AN_OPERATOR} or `)`")))
         }
     }
 
@@ -274,14 +274,7 @@ impl<'a> Parser<'a> {
     fn unexpected(&mut self, expected: &str) -> String {
         let found = self.peek().map_or("the end".into(), |c| format!("`{c}`"));
         let column = self.column();
-        let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
-        let (before, after) = self.text.split_at(self.at);
-        let is_decimal = is_digit(before.chars().last()) && is_digit(after.chars().nth(1));
-        let comma =
-            if is_decimal && after.starts_with(',') { "; write a decimal point" } else { "" };
-        format!(
-            "has {found} at column {column} of the expression, where {expected} is expected{comma}"
-        )
+        format!("has {found} at column {column} of the expression, where {expected} is expected")
     }
 }
 
