@@ -170,7 +170,7 @@ fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
 
 /// The lines of contact, of all of it and of each of several foundations.
 fn contact(task: &Task, last: StepRecord, figures: &LastFigures) -> Vec<String> {
-    let foundations = task.problem.foundations();
+    let foundations = &task.problem.foundations[..];
     if foundations.is_empty() {
         return Vec::new();
     }
@@ -244,16 +244,14 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
 
 /// The time of ζ_* with its error bar.
 fn stop_time(stop: &Stop) -> String {
-    let time = rounded(stop.time);
-    match (stop.from_mesh, stop.uncertainty) {
-        (_, steps) if steps >= stop.time || steps.is_nan() => {
-            format!("{time} (error unknown: ζ hardly falls there, or the time steps are too long)")
-        }
-        (Some(mesh), _) if stop.bar() >= stop.time => {
-            format!("{time} (error unknown: with a finer mesh the time may differ by {mesh:.1e})")
-        }
-        (Some(_), _) => with_bar(stop.time, Some(stop.bar())),
-        (None, steps) => format!("{} (the time steps alone)", with_bar(stop.time, Some(steps))),
+    let bar = with_bar(stop.time, Some(stop.bar()));
+    match stop.from_mesh {
+        _ if stop.bar() >= stop.time || stop.bar().is_nan() => format!(
+            "{} (error unknown: ζ hardly falls there, or steps or triangles are too large)",
+            rounded(stop.time)
+        ),
+        Some(_) => bar,
+        None => format!("{bar} (the time steps alone)"),
     }
 }
 

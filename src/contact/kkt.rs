@@ -14,14 +14,6 @@ pub struct Scales {
 }
 
 impl Scales {
-    /// The larger of each.
-    pub fn max(self, other: Self) -> Self {
-        Self {
-            force: self.force.max(other.force),
-            displacement: self.displacement.max(other.displacement),
-        }
-    }
-
     /// ‖·‖₂ of forces over F.
     pub(super) fn of_force(self, force: f64) -> f64 {
         relative(force, self.force)

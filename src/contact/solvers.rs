@@ -135,15 +135,7 @@ pub const REGISTRY: &[SolverEntry] =
     &[active_set::ACTIVE_SET, penalty_duality::PENALTY_DUALITY, tao::TAO];
 
 /// Their names.
-pub const SOLVERS: [&str; REGISTRY.len()] = {
-    let mut names = [""; REGISTRY.len()];
-    let mut number = 0;
-    while number < names.len() {
-        names[number] = REGISTRY[number].name;
-        number += 1;
-    }
-    names
-};
+pub const SOLVERS: [&str; 3] = [REGISTRY[0].name, REGISTRY[1].name, REGISTRY[2].name];
 
 /// There is no contact solver of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

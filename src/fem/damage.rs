@@ -74,14 +74,9 @@ pub fn source(
     let phi: Vec<_> = triangles.map(|t| source.of_triangle(&points(t))).collect();
     // A NaN, which is neither less nor equal, is refused too.
     let is_wrong = |phi: &f64| !matches!(phi.partial_cmp(&0.0), Some(Less | Equal));
-    let all = phi.as_flattened();
-    // The compiler makes a faster loop of counting than of searching.
-    if all.iter().filter(|phi| is_wrong(phi)).count() == 0 {
-        return Ok(phi);
-    }
-    let at = all.iter().position(is_wrong).unwrap_or_default();
+    let Some(at) = phi.as_flattened().iter().position(is_wrong) else { return Ok(phi) };
     let DamagePoint { place, zeta, .. } = points(at / 3)[at % 3];
-    Err(WrongSource { phi: all[at], place, zeta })
+    Err(WrongSource { phi: phi[at / 3][at % 3], place, zeta })
 }
 
 /// The load b_i = ∫ φ λ_i, m²/s, of a source φ from [`source`]. For P1 φ is affine between the vertices; for

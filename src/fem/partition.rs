@@ -62,11 +62,6 @@ impl Partition {
         self.global[node] * block as i32 + component as i32
     }
 
-    /// The global row of an owned node's component, −1 (left out by PETSc) of a ghost's.
-    pub fn row(&self, node: usize, block: usize, component: usize) -> i32 {
-        if node < self.owned { self.global(node, block, component) } else { -1 }
-    }
-
     /// Fetches the ghosts of a field with `block` components from their owners. Collective.
     ///
     /// # Errors

@@ -5,15 +5,6 @@ use std::collections::BTreeMap;
 /// Directions at most at this angle, rad, are one: with two of them a node would lose too many digits.
 pub const SAME_DIRECTION: f64 = 1e-4;
 
-/// A node of a set of boundary edges.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BoundaryNode {
-    /// Index of the node in the mesh.
-    pub node: usize,
-    /// Its faces: one, or two at a corner. (More only where parts of the body touch in a point.)
-    pub faces: Vec<BoundaryFace>,
-}
-
 /// The boundary at a node as a plane face: its normal and its tributary length. A corner has two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundaryFace {
@@ -55,21 +46,11 @@ fn angle([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
     (a * d - b * c).abs().atan2(a * c + b * d)
 }
 
-/// The nodes of a set of boundary edges, in increasing order. Each item of `faces` is a node and the face of
-/// one edge at this node.
+/// The faces of each node of a boundary, one, or two at a corner. (More only where parts of the body touch in a point.) Each
+/// item of `faces` is a node and the face of one edge at this node.
 ///
-/// A node's normal is the length-weighted mean of its edges' normals. At a corner of the boundary the node keeps both. The
-/// sum of the lengths of all faces is the length of the edges.
-pub fn boundary_nodes(faces: impl IntoIterator<Item = (usize, BoundaryFace)>) -> Vec<BoundaryNode> {
-    let nodes = joined_faces(faces.into_iter().map(|(node, face)| (node, face, ())));
-    let node = |(node, faces): (usize, Vec<(BoundaryFace, Vec<()>)>)| BoundaryNode {
-        node,
-        faces: faces.into_iter().map(|(face, _)| face).collect(),
-    };
-    nodes.into_iter().map(node).collect()
-}
-
-/// Joins the `faces` of each node that continue each other smoothly. Each face gets the `T` of its parts.
+/// Faces that continue each other smoothly are joined: a node's normal is the length-weighted mean of its edges' normals.
+/// The sum of the lengths of all faces is the length of the edges. Each joined face gets the `T` of its parts.
 pub fn joined_faces<T>(
     faces: impl IntoIterator<Item = (usize, BoundaryFace, T)>,
 ) -> BTreeMap<usize, Vec<(BoundaryFace, Vec<T>)>> {

@@ -22,7 +22,7 @@ mod quadratic;
 mod rectangle;
 mod refine;
 
-pub use boundary::{BoundaryFace, BoundaryNode, SAME_DIRECTION, boundary_nodes, joined_faces};
+pub use boundary::{BoundaryFace, SAME_DIRECTION, joined_faces};
 pub use error::MeshError;
 pub use format::{FORMATS, Format};
 pub use gmsh::{copies, load, load_graded, renamed, scaling_factor};

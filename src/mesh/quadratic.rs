@@ -105,7 +105,7 @@ impl Mesh {
     }
 
     /// Per triangle: the numbers of its surfaces.
-    fn surfaces_of_triangles(&self) -> Vec<Vec<usize>> {
+    pub(super) fn surfaces_of_triangles(&self) -> Vec<Vec<usize>> {
         let mut surfaces = vec![Vec::new(); self.triangles.len()];
         for (number, triangles) in self.surfaces.values().enumerate() {
             triangles.iter().for_each(|&triangle| surfaces[triangle].push(number));

@@ -273,14 +273,6 @@ fn csv_text<T: Serialize>(
     writer.into_inner().map_err(|error| error.into_error().into())
 }
 
-/// Writes a CSV file with a row per element. It appears complete or not at all.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), OutputError> {
-    write_whole(path, &csv_text(true, rows).map_err(|e| OutputError::new(path, e))?)
-}
-
 /// Writes a file that appears complete or not at all: a complete temporary file beside it is renamed.
 ///
 /// # Errors

@@ -5,7 +5,7 @@ use crate::{
     ROUNDING,
     contact::{NodalConstraint, RigidMotions},
     fem::{Body, Terms, normal_error},
-    mesh::{BoundaryFace, BoundaryNode, Lines, boundary_nodes, extent, joined_faces},
+    mesh::{BoundaryFace, Lines, extent, joined_faces},
     scene::{Condition, Expression, Gap, Scene},
 };
 
@@ -63,8 +63,9 @@ impl BoundaryConditions {
             let edges = body.edges(mesh.edges_of(&boundary.name));
             let follows_mesh = boundary.gap().is_none_or(|gap| gap.normal.is_none());
             let normal_error = if follows_mesh { normal_error(&edges, points, lines) } else { 0.0 };
-            for at in boundary_nodes(edges.iter().flat_map(|edge| edge.faces(points, lines))) {
-                let (node, point) = (at.node, points[at.node]);
+            let faces = edges.iter().flat_map(|edge| edge.faces(points, lines));
+            for (node, faces) in joined_faces(faces.map(|(node, face)| (node, face, ()))) {
+                let (point, faces) = (points[node], faces.iter().map(|(face, _)| *face));
                 let largest = &mut conditions.normal_errors[node];
                 *largest = largest.max(normal_error);
                 let prescribed =
@@ -77,13 +78,17 @@ impl BoundaryConditions {
                                 values.for_each(|of| conditions.add(prescribed(axis), point, of));
                             }
                         }
-                        Condition::Symmetry => at.faces.iter().for_each(|face| {
+                        Condition::Symmetry => faces.clone().for_each(|face| {
                             conditions.add(prescribed(face.normal), point, Vec::new());
                         }),
                         Condition::Gap(gap) => {
                             let distance = distance(gap, point, scene.start(), rounding);
-                            let faces = faces(gap, &at).into_iter();
-                            gaps.extend(faces.map(|face| (node, face, distance.clone())));
+                            let length = faces.clone().map(|face| face.length).sum();
+                            let plane =
+                                gap.normal.map(|normal| BoundaryFace::plane(normal, length));
+                            let faces =
+                                plane.map_or_else(|| faces.clone().collect(), |of| vec![of]);
+                            gaps.extend(faces.into_iter().map(|of| (node, of, distance.clone())));
                         }
                         Condition::Load(_) => {}
                     }
@@ -131,15 +136,5 @@ fn distance(gap: &Gap, [x, y]: [f64; 2], start: f64, rounding: f64) -> Expressio
     match gap.distance.eval(x, y, start) {
         _ if gap.distance.depends_on_time() => gap.distance.clone(),
         g => Expression::constant(if g.abs() <= rounding { g.max(0.0) } else { g }),
-    }
-}
-
-/// The faces of a gap at a node: in the fixed direction of the gap, or along the boundary's normals.
-fn faces(gap: &Gap, at: &BoundaryNode) -> Vec<BoundaryFace> {
-    match gap.normal {
-        Some(normal) => {
-            vec![BoundaryFace::plane(normal, at.faces.iter().map(|face| face.length).sum())]
-        }
-        None => at.faces.clone(),
     }
 }

@@ -93,9 +93,10 @@ pub struct DiscreteProblem {
     pub(crate) largest_load: f64,
     /// KKT tolerance.
     pub tolerance: f64,
-    /// The numbers and names of the materials of the body, and the names of the foundations.
+    /// The numbers and names of the materials of the body.
     pub(crate) materials: Vec<(usize, String)>,
-    pub(crate) foundations: Vec<String>,
+    /// The names of the boundaries with a gap.
+    pub foundations: Vec<String>,
     scene: Scene,
     /// The collapse at which the run ends early, if the loads drive an unsupported motion.
     pub collapse: Option<Collapse>,
@@ -200,11 +201,6 @@ impl DiscreteProblem {
     /// The names of the materials of the body.
     pub fn materials(&self) -> impl Iterator<Item = &str> + Clone {
         self.materials.iter().map(|(_, name)| &**name)
-    }
-
-    /// The names of the boundaries with a gap.
-    pub fn foundations(&self) -> &[String] {
-        &self.foundations
     }
 
     /// Nodal loads at `time`, N per metre of thickness. Rounding, as in sin(pi) = 1.2e-16, counts as zero.

@@ -151,21 +151,11 @@ pub(super) struct BoundaryKeys {
 }
 
 pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
-    let BoundaryKeys {
-        name,
-        r#where: selection,
-        displacement,
-        symmetry,
-        gap,
-        normal,
-        traction,
-        pressure,
-    } = keys;
     let prescribed = |value: toml::Value| match value.as_str() {
         Some("free") => Ok(None),
         _ => value.try_into().map(Some).map_err(is_wrong),
     };
-    let displacement = match displacement {
+    let displacement = match keys.displacement {
         Some([x, y]) => Some([prescribed(x)?, prescribed(y)?]),
         None => None,
     };
@@ -173,19 +163,19 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
         let problem = "is \"free\" in both components; leave it out".to_owned();
         return Err(("displacement", problem));
     }
-    if selection.as_ref().is_some_and(Expression::depends_on_time) {
+    if keys.r#where.as_ref().is_some_and(Expression::depends_on_time) {
         return Err(("where", "depends on t; it selects a part of the undeformed body".to_owned()));
     }
-    if normal.is_some() && gap.is_none() {
+    if keys.normal.is_some() && keys.gap.is_none() {
         return Err(("normal", "needs a gap beside it".to_owned()));
     }
-    let normal = normal.map(unit_vector).transpose()?;
+    let normal = keys.normal.map(unit_vector).transpose()?;
     let conditions = [
         displacement.map(Condition::Displacement),
-        symmetry.then_some(Condition::Symmetry),
-        gap.map(|distance| Condition::Gap(Gap { distance, normal })),
-        traction.map(|f| Condition::Load(SurfaceLoad::Traction(f))),
-        pressure.map(|p| Condition::Load(SurfaceLoad::Pressure(p))),
+        keys.symmetry.then_some(Condition::Symmetry),
+        keys.gap.map(|distance| Condition::Gap(Gap { distance, normal })),
+        keys.traction.map(|f| Condition::Load(SurfaceLoad::Traction(f))),
+        keys.pressure.map(|p| Condition::Load(SurfaceLoad::Pressure(p))),
     ];
     let conditions: Vec<_> = conditions.into_iter().flatten().collect();
     if let Some([one, other]) = contradiction(&conditions, &conditions) {
@@ -201,7 +191,7 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
         let choices = choices.collect::<Vec<_>>().join(", ");
         return Err(("", format!("has nothing in it: give it one of {choices}, or remove it")));
     }
-    Ok(Boundary { name, selection, conditions })
+    Ok(Boundary { name: keys.name, selection: keys.r#where, conditions })
 }
 
 /// A constant direction, scaled to length 1.

@@ -200,17 +200,14 @@ impl Scene {
             (nx * x + ny * y, [from, to])
         };
         let wrong = curve.edges.iter().map(cosine).filter(|(cosine, _)| *cosine <= OUTWARD);
-        let (cosine, worst) = wrong.clone().min_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let (cosine, worst) = wrong.min_by(|(a, _), (b, _)| a.total_cmp(b))?;
         let [x, y] = midpoint(mesh.nodes[worst[0]], mesh.nodes[worst[1]]);
         // Adding 0 turns -0 into 0.
         let [vx, vy] = mesh.edge_normal(worst).0.map(|component| component + 0.0);
         let how = if cosine < -OUTWARD { "into the body" } else { "along the boundary" };
-        let mend = match wrong.count() == curve.edges.len() {
-            true => "it must point from the body towards the obstacle",
-            false => "restrict the physical curve to where the body faces the obstacle",
-        };
         let problem = format!(
-            "points {how} at ({x}, {y}), where the outward normal is ({vx:.4}, {vy:.4}); {mend}"
+            "points {how} at ({x}, {y}), where the outward normal is ({vx:.4}, {vy:.4}); it must point from the body \
+             towards the obstacle, all along the physical curve"
         );
         Some(self.at_key(&boundary_key(&boundary.name, "normal"), &problem))
     }

@@ -295,7 +295,9 @@ fn read_value(value: &Value, schema: &Schema, scope: &Scope) -> Result<Value, St
         Value::String(text)
             if text.contains(',') && text.split(',').all(|part| part.parse::<f64>().is_ok()) =>
         {
-            format!(", but is {value}: write a decimal point; `signorini study` runs several values")
+            format!(
+                ", but is {value}: write a decimal point; `signorini study` runs several values"
+            )
         }
         _ => match evaluated.filter(|_| value.is_str()) {
             Some(Ok(number)) => format!(", but is {value} = {number:?}"),

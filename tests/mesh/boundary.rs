@@ -1,7 +1,7 @@
 //! Normals and tributary lengths at the nodes of a boundary.
 
-use crate::{boundary_nodes, common::length};
-use signorini::mesh::{BoundaryNode, Lines, Mesh, place};
+use crate::{BoundaryNode, boundary_nodes, common::length};
+use signorini::mesh::{Lines, Mesh, place};
 
 /// A polygon around its first node, the centre; boundary edges counter-clockwise.
 fn fan(points: &[[f64; 2]], centre: [f64; 2]) -> (Mesh, Vec<[usize; 2]>) {

@@ -6,15 +6,23 @@ mod common;
 
 use signorini::{
     fem::Edge,
-    mesh::{BoundaryNode, Lines, Mesh},
+    mesh::{BoundaryFace, Lines, Mesh, joined_faces},
 };
+
+/// A node of a boundary with its faces.
+struct BoundaryNode {
+    node: usize,
+    faces: Vec<BoundaryFace>,
+}
 
 /// The nodes of straight boundary edges.
 fn boundary_nodes(mesh: &Mesh, edges: &[[usize; 2]]) -> Vec<BoundaryNode> {
     let lines = Lines::boundary(mesh);
     let edges = edges.iter().map(|&ends| Edge { ends, middle: None });
     let faces = edges.flat_map(|edge| edge.faces(&mesh.nodes, &lines).collect::<Vec<_>>());
-    signorini::mesh::boundary_nodes(faces)
+    let nodes = joined_faces(faces.map(|(node, face)| (node, face, ()))).into_iter();
+    let faces = |faces: Vec<(BoundaryFace, _)>| faces.into_iter().map(|(face, _)| face).collect();
+    nodes.map(|(node, of)| BoundaryNode { node, faces: faces(of) }).collect()
 }
 
 mod blemishes;

@@ -68,11 +68,14 @@ impl Anderson {
             return next;
         }
         let w = &self.weights;
-        let differences = DMatrix::from_fn(w.len(), earlier.len(), |i, j| {
+        // The transpose, as the rows of all ranks then follow each other.
+        let differences = DMatrix::from_fn(earlier.len(), w.len(), |j, i| {
             (self.history[j + 1].1[i] - self.history[j].1[i]) * w[i]
         });
-        let target = DVector::from_fn(w.len(), |i, _| residual[i] * w[i]);
-        let (differences, target) = self.condensed(differences, target);
+        let differences = self.comm.gather(differences.as_slice());
+        let target = residual.iter().zip(w).map(|(r, w)| r * w).collect::<Vec<_>>();
+        let target = DVector::from(self.comm.gather(&target));
+        let differences = DMatrix::from_row_slice(target.len(), earlier.len(), &differences);
         let svd = differences.svd(true, true);
         let cut = SAME_ITERATE * svd.singular_values.max();
         let Ok(coefficients) = svd.solve(&target, cut) else { return next };
@@ -84,27 +87,6 @@ impl Anderson {
             next.iter_mut().zip(new.iter().zip(old)).for_each(|(v, (n, o))| *v -= factor * (n - o));
         }
         next
-    }
-
-    /// An equivalent least squares problem with the same rows on all ranks: per rank the triangle R of the QR
-    /// factorisation of its rows (Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34, 2012).
-    fn condensed(&self, a: DMatrix<f64>, b: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        if self.comm.is_serial() {
-            return (a, b);
-        }
-        let columns = a.ncols() + 1;
-        let mut rows = a.insert_column(columns - 1, 0.0);
-        rows.set_column(columns - 1, &b);
-        // At least as many rows as columns, so that all ranks have triangles of one size.
-        let missing = columns.saturating_sub(rows.nrows());
-        let r = rows.insert_rows(0, missing, 0.0).qr().r();
-        let all = DMatrix::from_column_slice(
-            columns,
-            columns * self.comm.size(),
-            &self.comm.gather(r.transpose().as_slice()),
-        )
-        .transpose();
-        (all.columns(0, columns - 1).into_owned(), all.column(columns - 1).into_owned())
     }
 
     fn norm(&self, v: &[f64]) -> f64 {

@@ -2,7 +2,7 @@
 //!
 //! A kept file ends with a comment of three digests: of all inputs from which gmsh made the mesh, of the gmsh that
 //! made it, and of the file before this comment. A mesh is read again if the first digest is that of the present
-//! inputs, and gmsh is the same program or has the same version. A file is replaced only if the third digest is
+//! inputs, and gmsh is the same program or missing. A file is replaced only if the third digest is
 //! right: then this program wrote it, and nobody has changed it.
 
 use sha2::{Digest, Sha256};
@@ -11,7 +11,6 @@ use std::{
     ffi::OsString,
     fs, io,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 /// Commands and options of a `.geo` that read the file of the name that follows in quotes. (An unquoted name
@@ -125,7 +124,7 @@ pub fn origin(file: &[u8]) -> Option<[&str; 2]> {
 }
 
 /// The digest of the path, the length and the time of the installed gmsh, if there is one. Asking it for its version
-/// takes as long as a small mesh.
+/// would take as long as a small mesh.
 pub fn program() -> Option<String> {
     let paths = env::var_os("PATH")?;
     let program = env::split_paths(&paths).map(|folder| folder.join("gmsh")).find(|p| p.is_file());
@@ -133,12 +132,4 @@ pub fn program() -> Option<String> {
     let data = fs::metadata(&program).ok()?;
     let identity = format!("{program:?} {} {:?}", data.len(), data.modified().ok()?);
     Some(digest(identity.as_bytes()))
-}
-
-/// The version of the installed gmsh, if there is one.
-pub fn version() -> Option<String> {
-    let said = Command::new("gmsh").arg("--version").output().ok()?;
-    // Some versions write it to stdout, others to stderr. A development version goes on with "-git".
-    let said = [said.stdout, said.stderr].concat();
-    Some(String::from_utf8_lossy(&said).trim().split('-').next()?.to_owned())
 }

@@ -24,7 +24,7 @@ use std::{
 ///
 /// The mesh is kept beside its file. Its name lists the parameters and order 2, as in `bridge-grading=3-size=0.25.msh`,
 /// `hertz.order2.msh` and, for other files than a `.geo`, `part.step-size=2.msh`. It is read again if gmsh would make it
-/// from the same files, parameters and order, in the same version.
+/// from the same files, parameters and order, and is the same program.
 ///
 /// Each parameter overrides the `DefineConstant` of its name. `size`, in m, also bounds the length of the edges.
 ///
@@ -123,12 +123,9 @@ fn kept(
     if let (Ok(file), Some([made_from, made_by])) = (&cached, origin)
         && made_from == digest
         && inputs.are_all
+        && gmsh.as_ref().is_none_or(|gmsh| gmsh == made_by)
     {
-        let mesh = parse(file, &path)?;
-        let is_same = gmsh.as_ref().is_none_or(|gmsh| gmsh == made_by);
-        if is_same || cache::version().is_none_or(|version| mesh.gmsh == Some(version)) {
-            return Ok(mesh);
-        }
+        return parse(file, &path);
     }
     let bytes = match format {
         Format::Geometry => run((geo, None), arguments, &last, "mesh it")?,
@@ -181,8 +178,6 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     let defined = || includes || text.split(|c| !word(c)).any(|w| w == name);
     if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit()) {
         Some("the name must consist of letters, digits and underscores")
-    } else if !value.is_finite() {
-        Some("the value must be finite")
     } else if name == "size" {
         (value <= 0.0).then_some("the size must be positive")
     } else {

@@ -11,26 +11,17 @@ pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Re
     if part.iter().all(|&part| part == 0) {
         return Ok(());
     }
-    // Triangles that are connected through nodes make one piece.
-    let mut first = vec![None; nodes.len()];
-    let corners = triangles.iter().enumerate().flat_map(|(t, nodes)| nodes.map(|node| (node, t)));
-    let meeting = corners.map(|(node, t)| (node, [*first[node].get_or_insert(t), t]));
-    let meeting: Vec<(usize, [usize; 2])> = meeting.collect();
-    let piece = components(triangles.len(), meeting.iter().map(|(_, pair)| *pair));
-    let pieces: Vec<usize> = (0..triangles.len()).filter(|&t| piece[t] == t).collect();
-    let place = |at: [f64; 2]| place(extent(nodes), at);
     let middle =
         |t: usize| [0, 1].map(|k| triangles[t].map(|node| nodes[node][k] / 3.0).iter().sum());
-    let problem = if let [a, b, more @ ..] = &pieces[..] {
-        let (count, two) = (pieces.len(), if more.is_empty() { "" } else { " two of them" });
-        let [a, b] = [a, b].map(|t| place(middle(*t)));
-        format!("the mesh has {count} pieces,{two} around {a} and {b}; join them (gmsh: Coherence)")
-    } else {
-        let hinge = meeting.iter().find(|(_, [a, b])| part[*a] != part[*b]);
-        let at = hinge.map_or_else(String::new, |&(node, _)| place(nodes[node]));
-        format!("parts of the mesh meet in a single node only, at {at}; join them along an edge")
-    };
-    error_at(None, problem + ", or solve them one by one")
+    let pieces = (0..triangles.len()).filter(|&t| part[t] == t);
+    let around = pieces.clone().take(2).map(|t| place(extent(nodes), middle(t)));
+    let problem = format!(
+        "the mesh has {} pieces without common edges, as around {}; join them along edges (gmsh: Coherence), or \
+         solve them one by one",
+        pieces.count(),
+        around.collect::<Vec<_>>().join(" and ")
+    );
+    error_at(None, problem)
 }
 
 /// The sets into which `links` join the numbers below `count` (union–find). Per number: the smallest member

@@ -12,18 +12,18 @@ impl Mesh {
     /// entity, and so are each combination of surfaces that triangles belong to and each point of the geometry.
     pub fn to_msh(&self) -> String {
         let midpoints = if self.curved.is_empty() { Vec::new() } else { self.midpoints() };
-        let surfaces: Vec<(&str, Vec<usize>)> = match self.surfaces.is_empty() {
-            true => vec![("body", (0..self.triangles.len()).collect())],
-            false => self.surfaces.iter().map(|(name, t)| (&**name, t.clone())).collect(),
+        let (surfaces, groups): (Vec<&str>, _) = match self.surfaces.is_empty() {
+            true => (vec!["body"], vec![vec![0]; self.triangles.len()]),
+            false => {
+                (self.surfaces.keys().map(|name| &**name).collect(), self.surfaces_of_triangles())
+            }
         };
-        let mut groups = vec![Vec::new(); self.triangles.len()];
         let mut names = String::new();
         for (group, name) in (1..).zip(self.curves.keys()) {
             names += &format!("1 {group} \"{name}\"\n");
         }
-        for (group, (name, triangles)) in (1..).zip(&surfaces) {
+        for (group, name) in (1..).zip(&surfaces) {
             names += &format!("2 {group} \"{name}\"\n");
-            triangles.iter().for_each(|&t| groups[t].push(group));
         }
         let mut entities: BTreeMap<&[usize], usize> = BTreeMap::new();
         for groups in &groups {
@@ -32,10 +32,11 @@ impl Mesh {
         }
         // An entity: tag, bounding box (unused), physical groups, no boundary.
         let entity = |tag: usize, groups: &[usize]| {
-            let listed: String = groups.iter().map(|group| format!(" {group}")).collect();
+            let listed: String = groups.iter().map(|group| format!(" {}", group + 1)).collect();
             format!("{tag} 0 0 0 0 0 0 {}{listed} 0\n", groups.len())
         };
-        let lines: String = (1..=self.curves.len()).map(|tag| entity(tag, &[tag])).collect();
+        let lines: String =
+            (0..self.curves.len()).map(|curve| entity(curve + 1, &[curve])).collect();
         let faces: String = entities.iter().map(|(groups, &tag)| entity(tag, groups)).collect();
 
         let at = self.nodes.iter().chain(midpoints.iter().map(|(_, point)| point));

@@ -146,9 +146,7 @@ impl DiscreteProblem {
                 Dimension::Force => force,
                 Dimension::Moment => lever * force,
                 Dimension::Stress => force / lever,
-                Dimension::Work | Dimension::ContactLength => 0.0,
-                Dimension::Place | Dimension::Given => 0.0,
-                Dimension::Zeta | Dimension::OfZeta => 0.0,
+                _ => 0.0,
             };
             // No -0.
             *value = if value.abs() <= rounding { 0.0 } else { *value + 0.0 };
@@ -204,22 +202,19 @@ impl DiscreteProblem {
         for (bar, now) in bars.iter_mut().zip(now) {
             let Some(number) = self.figures.number(&bar.name) else { continue };
             bar.bar += self.tolerance * bar.scale;
+            // Places and given lengths have no bars.
             bar.bar += match bar.dimension {
                 Dimension::Zeta | Dimension::OfZeta => 0.0,
                 Dimension::Force => force.max(of_loads * bar.scale),
                 Dimension::Moment => (lever * force).max(of_loads * bar.scale),
-                Dimension::Work | Dimension::Length | Dimension::Stress => of_loads * bar.scale,
-                Dimension::ContactLength => of_loads * bar.scale,
-                Dimension::Place | Dimension::Given => 0.0,
+                _ => of_loads * bar.scale,
             };
             bar.bar += match bar.dimension {
                 Dimension::Zeta if self.figures[number].of != Of::Body => zeta,
                 Dimension::Zeta | Dimension::OfZeta => changes[number],
                 // σ = ζ𝒜ε(u).
                 Dimension::Stress => (displacement + zeta) * now,
-                Dimension::Work | Dimension::Length | Dimension::Force => displacement * now,
-                Dimension::Moment | Dimension::ContactLength => displacement * now,
-                Dimension::Place | Dimension::Given => 0.0,
+                _ => displacement * now,
             };
             // 0 < ζ ≤ 1 bounds every error of ζ.
             bar.bar = bar.bar.min(if bar.dimension.is_damage() { 1.0 } else { f64::INFINITY });
@@ -232,13 +227,9 @@ impl Figure {
     /// The size of a value, from which scales come: |value|, and 1 − ζ for a least or mean ζ.
     pub fn magnitude(&self, value: f64) -> f64 {
         match self.dimension {
-            Dimension::Zeta | Dimension::OfZeta if self.governing == Governing::Least => {
-                1.0 - value
-            }
-            Dimension::Place | Dimension::Given => 0.0,
-            Dimension::Zeta | Dimension::OfZeta => value,
-            Dimension::Work | Dimension::Length | Dimension::Force => value.abs(),
-            Dimension::Moment | Dimension::Stress | Dimension::ContactLength => value.abs(),
+            dimension if dimension.is_damage() && self.governing == Governing::Least => 1.0 - value,
+            dimension if dimension.has_bar() => value.abs(),
+            _ => 0.0,
         }
     }
 }

@@ -259,11 +259,7 @@ impl<'a> Parser<'a> {
     }
 
     fn closing_bracket(&mut self) -> Parsed {
-        if self.take(")") {
-            Ok(())
-        } else {
-            Err(self.unexpected(&format!("{AN_OPERATOR} or `)`")))
-        }
+        if self.take(")") { Ok(()) } else { Err(self.unexpected(&format!("{AN_OPERATOR} or `)`"))) }
     }
 
     /// The column of the next character, counted from 1.

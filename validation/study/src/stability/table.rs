@@ -3,7 +3,7 @@
 use crate::StudyError;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use signorini::output;
+use signorini::output::{self, OutputError};
 use std::path::PathBuf;
 
 /// What a row of a map turned out to be.
@@ -99,6 +99,10 @@ impl Table {
             let cells = cells.map(Option::unwrap_or_default);
             lines.push(cells.chain(serde_json::to_value(verdict)).collect());
         }
-        Ok(output::write_table(&self.path, &lines)?)
+        let failed = |error: csv::Error| OutputError::new(&self.path, error);
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        lines.iter().try_for_each(|line| writer.serialize(line)).map_err(failed)?;
+        let text = writer.into_inner().map_err(|error| failed(error.into_error().into()))?;
+        Ok(output::write_whole(&self.path, &text)?)
     }
 }
