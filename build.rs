@@ -22,13 +22,13 @@ const PETSC: &str = "\
     MatSeqAIJSetPreallocationCSR|MatMPIAIJSetPreallocationCSR|MatMult|MatDuplicate|MatCopy|MatGetDiagonal|MatCreateVecs|\
     MatAXPY|MatScale|MatShift|MatAssemblyBegin|MatAssemblyEnd|\
     MatDiagonalSet|MatZeroRowsColumns|MatGetOwnershipRange|MatGetSize|MatGetInfo|\
-    MatGetRow|MatRestoreRow|PetscObjectTypeCompare|PetscObjectQueryFunction_Private|MatMPIAIJGetSeqAIJ|MatSeqAIJGetArray|\
+    MatGetRow|MatRestoreRow|PetscObjectTypeCompare|MatMPIAIJGetSeqAIJ|MatSeqAIJGetArray|\
     MatSeqAIJRestoreArray|MatSeqAIJGetArrayRead|MatSeqAIJRestoreArrayRead|\
     MatCreateShell|MatShellSetOperation|MatShellGetContext|MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
     KSPCreate|KSPDestroy|KSPSetType|KSPSetOptionsPrefix|KSPSetFromOptions|KSPSetOperators|KSPSolve|\
     KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReasonString|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|KSPGetTolerances|\
     PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
-    PCFactorSetMatSolverType|PCFactorGetMatrix|PCFactorGetMatSolverType|\
+    PCFactorSetMatSolverType|\
     PCSetApplicationContext|PCGetApplicationContext|PCShellSetApply|PCShellSetSetUp|PCShellSetName|\
     TaoCreate|TaoDestroy|TaoSetType|TaoSetSolution|TaoSetVariableBounds|\
     TaoSetObjectiveAndGradient|TaoSetHessian|TaoSetFromOptions|TaoSetTolerances|\

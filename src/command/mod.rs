@@ -32,7 +32,7 @@ pub use script::{ScriptArguments, script};
 use clap::Args;
 use ranks::require_one_process;
 use signorini::{
-    contact::{self, REGISTRY, SOLVERS, TAO_TYPES},
+    contact::{REGISTRY, SOLVERS, TAO_TYPES},
     estimate,
     interrupt::{Signal, received},
     mesh::{self, Format, Mesh},
@@ -77,12 +77,6 @@ impl<E: fmt::Display> From<E> for Failure {
 pub fn tell(kind: &str, text: &str) {
     // If stderr is closed, the exit code still reports the failure.
     let _ = io::stderr().write_all(format!("{kind}: {text}\n").as_bytes());
-}
-
-/// Checks that there is a solver of this name; `option` is the option or key that has it.
-fn check_solver(option: &str, name: &str) -> Result<(), Failure> {
-    let found = contact::find(name).map(|_| ());
-    found.map_err(|unknown| Failure::input(format!("{option}: {unknown}")))
 }
 
 /// Checks PETSc options before the results of an earlier run are removed.

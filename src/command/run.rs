@@ -4,7 +4,7 @@ use super::{
     Failure, SOLVERS, SceneArguments,
     accuracy::{adapt, confirm_stop, has_time, measure_errors, shorter_steps},
     check::contact_nodes,
-    check_petsc, check_solver,
+    check_petsc,
     checkpoint::Checkpoint,
     ranks::{agree, barrier_or_abort},
     read_mesh,
@@ -63,7 +63,6 @@ impl RunArguments {
     /// Checks that no argument is without effect.
     fn check(&self) -> Result<(), Failure> {
         self.scene.check()?;
-        self.solver.iter().try_for_each(|name| check_solver("--solver", name))?;
         let is_root = |out: &PathBuf| out.canonicalize().is_ok_and(|out| out.parent().is_none());
         if self.out.iter().any(is_root) {
             let problem =

@@ -1,5 +1,6 @@
 //! The elements: the P1 triangle, and the P2 triangle with straight or curved sides.
 
+use crate::mesh::{jacobian, quadratic_derivatives};
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
 /// An element with N nodes: gradients and weights at its Q quadrature points.
@@ -38,32 +39,6 @@ pub const POINTS: [[f64; 3]; 3] = {
 pub fn quadratic_values([a, b, c]: [f64; 3]) -> [f64; 6] {
     let vertex = |l: f64| l * (2.0 * l - 1.0);
     [vertex(a), vertex(b), vertex(c), 4.0 * a * b, 4.0 * b * c, 4.0 * c * a]
-}
-
-/// The derivatives of the six P2 functions by λ_1 and λ_2 (λ_0 = 1 − λ_1 − λ_2).
-fn quadratic_derivatives([a, b, c]: [f64; 3]) -> [[f64; 2]; 6] {
-    [
-        [1.0 - 4.0 * a, 1.0 - 4.0 * a],
-        [4.0 * b - 1.0, 0.0],
-        [0.0, 4.0 * c - 1.0],
-        [4.0 * (a - b), -4.0 * b],
-        [4.0 * c, 4.0 * b],
-        [-4.0 * c, 4.0 * (a - c)],
-    ]
-}
-
-/// The Jacobian ∂x/∂λ of the isoparametric triangle of six nodes.
-fn jacobian(nodes: &[[f64; 2]; 6], derivatives: &[[f64; 2]; 6]) -> Matrix2<f64> {
-    let entry = |row: usize, column: usize| {
-        nodes.iter().zip(derivatives).map(|(x, d)| x[row] * d[column]).sum()
-    };
-    Matrix2::from_fn(entry)
-}
-
-/// Twice the area per reference area of the isoparametric triangle of six nodes at barycentric coordinates,
-/// m².
-pub(super) fn quadratic_measure(nodes: &[[f64; 2]; 6], point: [f64; 3]) -> f64 {
-    jacobian(nodes, &quadratic_derivatives(point)).determinant()
 }
 
 impl Quadratic {

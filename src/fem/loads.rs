@@ -3,9 +3,9 @@
 use super::{
     Body, Cells, Edge, Elements,
     edge::THREE_GAUSS,
-    element::{POINTS, quadratic_measure, quadratic_values},
+    element::{POINTS, quadratic_values},
 };
-use crate::mesh::{midpoint, twice_area};
+use crate::mesh::{midpoint, quadratic_measure, twice_area};
 use nalgebra::Matrix3;
 use rustc_hash::FxHashMap as HashMap;
 

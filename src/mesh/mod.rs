@@ -30,6 +30,7 @@ pub(crate) use lines::CHORDS;
 pub use lines::Lines;
 pub use msh::{parse, read};
 pub use quadratic::{Kink, midpoint};
+pub(crate) use quadratic::{jacobian, quadratic_derivatives, quadratic_measure};
 pub use refine::Refinement;
 pub(crate) use refine::TIES;
 

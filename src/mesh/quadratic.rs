@@ -5,6 +5,7 @@
 //! x(λ) = Σ_i λ_i p_i + Σ_{i<j} 4λ_iλ_j d_ij of the barycentric coordinates λ.
 
 use super::{Lines, Mesh, sorted};
+use nalgebra::Matrix2;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 
 /// Relative offset |d| / length below which an edge is straight.
@@ -129,26 +130,42 @@ impl Mesh {
     /// Whether det ∂x/∂(λ₂, λ₃) of a triangle is above `bound` (m²) at its vertices, at the midpoints of its
     /// sides and at the points of the three-point quadrature rule inside it.
     pub(super) fn jacobian_exceeds(&self, bound: f64, triangle: [usize; 3]) -> bool {
-        // ∂λ_i/∂λ₂ and ∂λ_i/∂λ₃.
-        const GRADIENTS: [[f64; 2]; 3] = [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
-        let (nodes, offsets) = (triangle.map(|node| self.nodes[node]), self.offsets(triangle));
-        let determinant = |lambda: [f64; 3]| {
-            let derivative = |axis: usize, by: usize| -> f64 {
-                let term = |i: usize| {
-                    let j = (i + 1) % 3;
-                    let product = GRADIENTS[i][by] * lambda[j] + lambda[i] * GRADIENTS[j][by];
-                    GRADIENTS[i][by] * nodes[i][axis] + 4.0 * product * offsets[i][axis]
-                };
-                (0..3).map(term).sum()
-            };
-            derivative(0, 0) * derivative(1, 1) - derivative(0, 1) * derivative(1, 0)
-        };
+        let [a, b, c] = triangle;
+        let sides = [[a, b], [b, c], [c, a]].map(|side| self.midpoint(side));
+        let [p, q, r] = triangle.map(|node| self.nodes[node]);
+        let nodes = [p, q, r, sides[0], sides[1], sides[2]];
         let points = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0]];
         let mut rotated =
             points.into_iter().flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
         // This is false for NaN, too.
-        rotated.all(|lambda| determinant(lambda) > bound)
+        rotated.all(|lambda| quadratic_measure(&nodes, lambda) > bound)
     }
+}
+
+/// The derivatives of the six P2 functions by λ_1 and λ_2 (λ_0 = 1 − λ_1 − λ_2).
+pub(crate) fn quadratic_derivatives([a, b, c]: [f64; 3]) -> [[f64; 2]; 6] {
+    [
+        [1.0 - 4.0 * a, 1.0 - 4.0 * a],
+        [4.0 * b - 1.0, 0.0],
+        [0.0, 4.0 * c - 1.0],
+        [4.0 * (a - b), -4.0 * b],
+        [4.0 * c, 4.0 * b],
+        [-4.0 * c, 4.0 * (a - c)],
+    ]
+}
+
+/// The Jacobian ∂x/∂λ of the isoparametric triangle of six nodes.
+pub(crate) fn jacobian(nodes: &[[f64; 2]; 6], derivatives: &[[f64; 2]; 6]) -> Matrix2<f64> {
+    let entry = |row: usize, column: usize| {
+        nodes.iter().zip(derivatives).map(|(x, d)| x[row] * d[column]).sum()
+    };
+    Matrix2::from_fn(entry)
+}
+
+/// Twice the area per reference area of the isoparametric triangle of six nodes at barycentric coordinates,
+/// m².
+pub(crate) fn quadratic_measure(nodes: &[[f64; 2]; 6], point: [f64; 3]) -> f64 {
+    jacobian(nodes, &quadratic_derivatives(point)).determinant()
 }
 
 fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {

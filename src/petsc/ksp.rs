@@ -129,7 +129,8 @@ impl Ksp {
         Ok(pc)
     }
 
-    /// Makes the preconditioner from `matrix` (PCSetUp); false if the matrix is not positive definite.
+    /// Makes the preconditioner from `matrix` (PCSetUp); false if the matrix is not positive definite. (MUMPS accepts negative
+    /// pivots; conjugate gradients then end above the limit.)
     /// PETSc keeps a reference to the matrix, but later values of it do not change the preconditioner.
     pub(crate) fn set_up(
         &self,
@@ -139,6 +140,7 @@ impl Ksp {
         let (ksp, pc) = (self.handle.raw(), self.pc()?);
         let mut context = Context { preconditioner: own };
         let stored = matrix.assembled()?;
+        let mut reason = raw::PCFailedReason::PC_NOERROR;
         // SAFETY: live handles; the context outlives the set-up. Without PCSetReusePreconditioner the
         // next solve would factorise again when the values of the matrix have changed.
         unsafe {
@@ -150,37 +152,9 @@ impl Ksp {
                 set_up => set_up?,
             }
             check(raw::PCSetReusePreconditioner(pc, petsc_bool(true)))?;
-        }
-        self.is_definite()
-    }
-
-    /// Whether the factorisation found only positive pivots, as far as the package reports them.
-    fn is_definite(&self) -> Result<bool, PetscError> {
-        /// INFOG(12), the number of negative pivots. MUMPS factorises into LDLᵀ and accepts them.
-        const NEGATIVE_PIVOTS: c_int = 12;
-        let pc = self.pc()?;
-        let mut reason = raw::PCFailedReason::PC_NOERROR;
-        let (mut factor, mut package, mut negative) = (ptr::null_mut(), ptr::null(), 0);
-        // The function MatMumpsGetInfog, by the name under which factors of MUMPS register it: a PETSc without MUMPS need not
-        // have it.
-        type Infog = unsafe extern "C" fn(raw::Mat, c_int, *mut c_int) -> raw::PetscErrorCode;
-        let (mut infog, name) = (None::<Infog>, c"MatMumpsGetInfog_C".as_ptr());
-        // SAFETY: a live handle; the package's name is a constant of PETSc; the function has this type.
-        unsafe {
             check(raw::PCGetFailedReason(pc, &mut reason))?;
-            if reason != raw::PCFailedReason::PC_NOERROR {
-                return Ok(false);
-            }
-            // Preconditioners without a factor leave the name null.
-            check(raw::PCFactorGetMatSolverType(pc, &mut package))?;
-            if !package.is_null() && CStr::from_ptr(package) == c"mumps" {
-                check(raw::PCFactorGetMatrix(pc, &mut factor))?;
-                let found = (&raw mut infog).cast();
-                check(raw::PetscObjectQueryFunction_Private(factor.cast(), name, found))?;
-                infog.map_or(Ok(()), |get| check(get(factor, NEGATIVE_PIVOTS, &mut negative)))?;
-            }
         }
-        Ok(negative == 0)
+        Ok(reason == raw::PCFailedReason::PC_NOERROR)
     }
 
     /// Solves for `x` with the present preconditioner (KSPSolve), until the residual of the free unknowns is

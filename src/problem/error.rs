@@ -22,18 +22,6 @@ pub enum SetupError {
         /// The contradiction.
         source: ConstraintError,
     },
-    /// A load, a prescribed displacement or a gap is not finite, and this rank does not know where.
-    #[error(
-        "{scene}: the body force or a value of a boundary is not finite or too large at t = {}; check its expression for divisions by zero, roots and logarithms \
-         of negative numbers",
-        rounded(*time)
-    )]
-    NotFinite {
-        /// The scene file.
-        scene: PathBuf,
-        /// The time, s.
-        time: f64,
-    },
     /// The load drives a rigid motion.
     #[error("{scene}: at t = {}, {source}", rounded(*time))]
     Driven {

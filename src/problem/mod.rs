@@ -55,7 +55,7 @@ use crate::{
     mesh::{Lines, Mesh},
     model::DamageLaw,
     petsc::{PetscError, Session},
-    scene::{Boundary, Scene, Stepping, TimeGrid},
+    scene::{Boundary, Scene, SceneError, Stepping, TimeGrid, rounded},
 };
 use boundary_conditions::BoundaryConditions;
 use nalgebra::DVector;
@@ -237,12 +237,17 @@ impl DiscreteProblem {
         Ok(load)
     }
 
-    /// The error for a value that is not finite at `time`. It names the value if this rank finds it.
+    /// The error for a value that is not finite at `time`. It names the value if it is at a point of the check.
     fn not_finite(&self, time: f64) -> SetupError {
-        match self.scene.check_values(&self.body.mesh, &[time]) {
-            Err(error) => error.into(),
-            Ok(()) => SetupError::NotFinite { scene: self.scene.path.clone(), time },
-        }
+        let unknown = || {
+            SceneError(vec![format!(
+                "{}: the body force or a value of a boundary is not finite or too large at t = {}; check its \
+                 expression for divisions by zero, roots and logarithms of negative numbers",
+                self.scene.path.display(),
+                rounded(time)
+            )])
+        };
+        self.scene.check_values(self.mesh(), &[time]).err().unwrap_or_else(unknown).into()
     }
 
     /// The prescribed unknowns and the bounds on the others at `time`, from the values of all rows.

@@ -60,7 +60,7 @@ fn a_mesh_of_two_bodies() {
     let corners = ["1 0 0 0", "2 1 0 0", "3 1 1 0", "4 3 0 0", "5 4 0 0", "6 4 1 0"];
     let directory = TestDirectory::new();
     directory.write("square.msh", &msh(&corners, &["1 2 5 1 2 3", "2 2 5 4 5 6"]));
-    let problem = "square.msh: the mesh has 2 pieces, around (0.6667, 0.3333) and";
+    let problem = "square.msh: the mesh has 2 pieces without common edges, as around (0.6667, 0.3333) and";
     directory.say(&["check", "scene.toml"]).fails(2, &[problem, "solve them one by one"]);
     refused(&directory, &[], &[problem]);
 }
@@ -69,7 +69,10 @@ fn a_mesh_of_two_bodies() {
 fn arguments() {
     let test_directory = TestDirectory::new();
     for (arguments, fragments) in [
-        (&["--solver", "simplex"][..], &["--solver: ", "`simplex`", "active-set", "tao"][..]),
+        (
+            &["--solver", "simplex"][..],
+            &["contact.solver is unknown", "`simplex`", "active-set", "tao"][..],
+        ),
         (&["--set", "time.stp=1"], &["--set time.stp=1: unknown key time.stp", "`step`"]),
         (&["--mesh", "none.msh"], &["none.msh: No such file"]),
         (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh, a geometry for gmsh"]),

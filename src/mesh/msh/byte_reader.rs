@@ -13,11 +13,8 @@ pub fn error_at<T>(at: impl Into<Option<usize>>, problem: impl Into<String>) -> 
 
 /// An error: the file has `found` instead of `what`. Long texts are cut.
 pub fn expected<T>(at: usize, what: &str, found: impl Display) -> Result<T> {
-    let mut found: String = found.to_string().trim().escape_debug().collect();
-    if found.chars().count() > 40 {
-        found = found.chars().take(40).chain(['…']).collect();
-    }
-    error_at(at, format!("expected {what}, found `{found}`"))
+    let found: String = found.to_string().trim().escape_debug().collect();
+    error_at(at, format!("expected {what}, found `{found:.40}`"))
 }
 
 /// The error of a file that is not a mesh file.
