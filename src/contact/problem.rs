@@ -2,7 +2,7 @@
 
 use super::{Bound, Kkt, Scales};
 use crate::{
-    linear::{LinearSystem, PhaseNames},
+    linear::LinearSystem,
     petsc::{Communicator, Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
@@ -42,16 +42,9 @@ pub struct ContactProblem<'a> {
 impl ContactProblem<'_> {
     /// K c = f on all unknowns.
     pub(super) fn system(&self) -> LinearSystem<'_> {
-        let phase_names = PhaseNames {
-            phases: self.phases,
-            factorisation: "contact/factorisation",
-            prescription: "contact/Schur complement",
-            triangular_solves: "contact/triangular solves",
-            product: "contact/products",
-        };
         LinearSystem {
             scale: self.stiffness_scale,
-            phase_names: Some(phase_names),
+            phases: Some(self.phases),
             ..LinearSystem::of(self.stiffness)
         }
     }

@@ -2,7 +2,9 @@
 
 mod preconditioner;
 
-use super::{CondensedSystem, Factor, LinearSystem, PhaseNames, Precision, Reduction};
+use super::{
+    CondensedSystem, Factor, LinearSystem, Precision, Reduction, linear_system::TRIANGULAR_SOLVES,
+};
 use crate::petsc::{Ksp, KspProblem, Matrix, PetscError, Session, Vector};
 use preconditioner::TimedFactor;
 use std::mem::take;
@@ -159,8 +161,7 @@ impl LinearSolver {
         }
         let (bytes, residual) = (0.5 * self.factor.bytes_per_application(), &self.residual);
         let factor = &mut self.factor;
-        let name = |phase_names: &PhaseNames| phase_names.triangular_solves;
-        system.timed(name, (0.5, bytes), || factor.condense(residual)).map(Some)
+        system.timed(TRIANGULAR_SOLVES, (0.5, bytes), || factor.condense(residual)).map(Some)
     }
 
     /// Back substitution: `x` ← `x` + d from the last solution for the condensed unknowns. If no prescribed
@@ -175,8 +176,7 @@ impl LinearSolver {
         x: &mut Vector,
     ) -> Result<(), PetscError> {
         let (bytes, d) = (0.5 * self.factor.bytes_per_application(), &mut self.expanded);
-        let expand = || self.factor.expand(d);
-        system.timed(|phase_names| phase_names.triangular_solves, (0.5, bytes), expand)?;
+        system.timed(TRIANGULAR_SOLVES, (0.5, bytes), || self.factor.expand(d))?;
         self.prepared = !moved;
         if moved {
             self.iterations += 1;

@@ -15,46 +15,40 @@ pub struct LinearSystem<'a> {
     /// The size of the diagonal entries of A. Prescribed unknowns get this diagonal entry in the factored
     /// matrix.
     pub scale: f64,
-    /// The phases to which the parts of a solve add their time.
-    pub phase_names: Option<PhaseNames<'a>>,
+    /// The phases to which the parts of a solve add their time, by the names below.
+    pub phases: Option<&'a Phases>,
 }
 
-/// The names of the phases of a solve.
-#[derive(Clone, Copy)]
-pub struct PhaseNames<'a> {
-    /// The record of phases.
-    pub phases: &'a Phases,
-    /// A new factor.
-    pub factorisation: &'static str,
-    /// A change of the prescribed unknowns in a condensed factor.
-    pub prescription: &'static str,
-    /// An application of the factor.
-    pub triangular_solves: &'static str,
-    /// A product with A.
-    pub product: &'static str,
-}
+/// The names of the phases of a solve: only contact has them.
+pub(super) const FACTORISATION: &str = "contact/factorisation";
+/// A change of the prescribed unknowns in a condensed factor.
+pub(super) const PRESCRIPTION: &str = "contact/Schur complement";
+/// An application of the factor.
+pub(super) const TRIANGULAR_SOLVES: &str = "contact/triangular solves";
+/// A product with A.
+const PRODUCT: &str = "contact/products";
 
 impl<'a> LinearSystem<'a> {
     /// A x = b.
     pub fn of(matrix: &'a Matrix) -> Self {
-        Self { matrix, prescribed: None, scale: 1.0, phase_names: None }
+        Self { matrix, prescribed: None, scale: 1.0, phases: None }
     }
 
     /// `y` ← A `x`.
     pub(super) fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
         let bytes = self.matrix.bytes_per_product();
-        self.timed(|phase_names| phase_names.product, (1.0, bytes), || self.matrix.multiply(x, y))
+        self.timed(PRODUCT, (1.0, bytes), || self.matrix.multiply(x, y))
     }
 
     /// Does `work`, which is this part of a call and reads and writes these bytes, and adds its time to a phase.
     pub(super) fn timed<R>(
         self,
-        name: impl FnOnce(&PhaseNames) -> &'static str,
+        name: &'static str,
         moved: (f64, f64),
         work: impl FnOnce() -> R,
     ) -> R {
-        match self.phase_names {
-            Some(phase_names) => phase_names.phases.time_moving(name(&phase_names), moved, work),
+        match self.phases {
+            Some(phases) => phases.time_moving(name, moved, work),
             None => work(),
         }
     }

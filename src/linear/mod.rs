@@ -42,7 +42,7 @@ mod raw {
 pub use cholesky::{Cholesky, Precision};
 pub use factor::{Factor, FactorState};
 pub use linear_solver::{LinearSolver, SolveReport};
-pub use linear_system::{LinearSystem, PhaseNames};
+pub use linear_system::LinearSystem;
 pub use lower_triangle::LowerTriangle;
 pub use refactorisation::{Reduction, RefactorisationPolicy};
 pub use schur::CondensedSystem;

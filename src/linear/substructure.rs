@@ -207,10 +207,10 @@ impl RankDivision {
         let rows = matrix.rows();
         let mut shared = vec![false; rows.len()];
         condensed.iter().for_each(|&i| shared[i] = true);
-        let before = |columns: &[i32]| columns.iter().any(|&j| j < rows.start);
+        let before = |columns: &[i32], _: &[f64]| columns.iter().any(|&j| j < rows.start);
         let (mut inner, mut own) = (Vec::new(), Vec::new());
         for (row, shared) in rows.clone().zip(shared) {
-            let shared = shared || matrix.read_columns(row, before)?;
+            let shared = shared || matrix.read_stored(row, before)?;
             if shared { &mut own } else { &mut inner }.push(row);
         }
         let own: Vec<f64> = own.into_iter().map(f64::from).collect();
@@ -220,7 +220,7 @@ impl RankDivision {
         }
         let mut near = Vec::new();
         for &row in &inner {
-            matrix.read_columns(row, |columns| {
+            matrix.read_stored(row, |columns, _| {
                 near.extend(columns.iter().filter_map(|j| interface.binary_search(j).ok()));
             })?;
         }

@@ -236,16 +236,8 @@ impl Matrix {
         self.read_stored(row, reader)
     }
 
-    /// Calls `reader` with the columns (increasing) of the stored entries of an owned row.
-    pub(crate) fn read_columns<R>(
-        &self,
-        row: i32,
-        reader: impl FnOnce(&[i32]) -> R,
-    ) -> Result<R, PetscError> {
-        self.read_stored(row, |columns, _| reader(columns))
-    }
-
-    fn read_stored<R>(
+    /// As [`Self::read_row`], with the stored entries: the columns are right, the values may be those of an earlier state.
+    pub(crate) fn read_stored<R>(
         &self,
         row: i32,
         reader: impl FnOnce(&[i32], &[f64]) -> R,

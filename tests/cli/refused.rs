@@ -60,7 +60,8 @@ fn a_mesh_of_two_bodies() {
     let corners = ["1 0 0 0", "2 1 0 0", "3 1 1 0", "4 3 0 0", "5 4 0 0", "6 4 1 0"];
     let directory = TestDirectory::new();
     directory.write("square.msh", &msh(&corners, &["1 2 5 1 2 3", "2 2 5 4 5 6"]));
-    let problem = "square.msh: the mesh has 2 pieces without common edges, as around (0.6667, 0.3333) and";
+    let problem =
+        "square.msh: the mesh has 2 pieces without common edges, as around (0.6667, 0.3333) and";
     directory.say(&["check", "scene.toml"]).fails(2, &[problem, "solve them one by one"]);
     refused(&directory, &[], &[problem]);
 }

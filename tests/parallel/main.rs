@@ -295,11 +295,7 @@ fn a_bad_mesh_is_told_once() {
     let directory = TestDirectory::new();
     directory.write("hinged.geo", HINGED);
     let said = run_on_ranks(&directory, 2, &["--mesh", "hinged.geo"]);
-    one_message(
-        &said,
-        2,
-        "pieces without common edges",
-    );
+    one_message(&said, 2, "pieces without common edges");
     assert!(!directory.path("out").exists(), "nothing is written");
 }
 

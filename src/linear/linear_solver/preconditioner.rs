@@ -3,7 +3,11 @@
 
 use super::LinearSolver;
 use crate::{
-    linear::{Factor, LinearSystem, Precision, factor::VERY_LARGE},
+    linear::{
+        Factor, LinearSystem, Precision,
+        factor::VERY_LARGE,
+        linear_system::{FACTORISATION, PRESCRIPTION, TRIANGULAR_SOLVES},
+    },
     petsc::{
         Matrix, Pattern, PetscError, Session, ShellPreconditioner, Vector, has_option,
         set_default_option,
@@ -91,8 +95,7 @@ impl LinearSolver {
     /// # Errors
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
-        let set_up = || self.set_up(system);
-        system.timed(|phase_names| phase_names.factorisation, (1.0, 0.0), set_up)
+        system.timed(FACTORISATION, (1.0, 0.0), || self.set_up(system))
     }
 
     fn set_up(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
@@ -128,7 +131,7 @@ impl LinearSolver {
     /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
     pub(super) fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
-        system.timed(|phase_names| phase_names.prescription, (1.0, 0.0), prescribe)
+        system.timed(PRESCRIPTION, (1.0, 0.0), prescribe)
     }
 
     /// Makes the preconditioner of a checkpoint again.
@@ -176,7 +179,6 @@ impl ShellPreconditioner for TimedFactor<'_> {
             return z.axpby(1.0, first, 0.0);
         }
         let bytes = self.factor.bytes_per_application();
-        let apply = || self.factor.apply(r, z);
-        self.system.timed(|phase_names| phase_names.triangular_solves, (1.0, bytes), apply)
+        self.system.timed(TRIANGULAR_SOLVES, (1.0, bytes), || self.factor.apply(r, z))
     }
 }

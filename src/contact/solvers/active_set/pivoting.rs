@@ -95,7 +95,7 @@ fn locally_deepest(
             other.is_ok_and(|i| violating[i].depth > (1.0 + EQUAL) * one.depth)
         };
         let pulls = one.side == 0.0;
-        if pulls || !stiffness.read_columns(row(one), |columns| columns.iter().any(is_deeper))? {
+        if pulls || !stiffness.read_stored(row(one), |columns, _| columns.iter().any(is_deeper))? {
             deepest.push(*one);
         }
     }
