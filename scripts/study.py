@@ -240,7 +240,10 @@ def main(prog=None):
         "NAME,…"), help="of the table, as for `signorini table`")
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
-    arguments, more = parser.parse_args(words[:cut]), words[cut + 1:]
+    (arguments, others), more = parser.parse_known_args(words[:cut]), words[cut + 1:]
+    if others:
+        parser.error(f"unrecognized arguments: {' '.join(others)}; options of `signorini run` follow --, "
+                     f"as in `-- {others[0]} …`")
     head, cases = arguments.cases
     keys = [key for key, _ in arguments.set]
     if twice := next((key for key in head + keys if (head + keys).count(key) > 1), None):

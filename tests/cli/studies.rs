@@ -23,6 +23,9 @@ fn a_study_runs_all_combinations_once_and_tells_their_figures() {
     assert!(!names.iter().any(|name| name.starts_with("fields")), "{names:?}");
     assert_eq!(directory.read(&format!("out/s/{folder}/contact.csv")).lines().count(), 6);
 
+    let refused = directory.say(&["study", "scene.toml", "--accuracy", "0.1"]);
+    refused.fails(2, &["unrecognized arguments: --accuracy", "as in `-- --accuracy"]);
+
     // Nothing is repeated but what is missing.
     directory.write(&format!("out/s/{folder}/summary.json"), "{");
     let again = directory.say(&words);

@@ -293,6 +293,10 @@ fn what_gmsh_rejects_is_told() {
         fails(&[("grdaing", 2.0)]).contains("`grdaing` = 2: the .geo file has no such parameter")
     );
     assert!(fails(&[("size", -1.0)]).contains("must be positive"));
+    // gmsh would work for hours.
+    assert!(
+        fails(&[("size", 1e-9)]).contains("size = 0.000000001 is too small for a body of 1 by 1")
+    );
     fails(&[("n", f64::NAN)]);
     assert!(fails(&[("../n", 1.0)]).contains("letters, digits"));
 

@@ -19,6 +19,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// The largest number of squares with the mesh size as their side in the box around a body. gmsh would work for hours on more.
+const MOST_SQUARES: f64 = 1e8;
+
 /// Reads a `.msh`, meshes a geometry with gmsh or converts the mesh of another program unless this was done before, and sorts
 /// nodes and triangles ([`Mesh::in_morton_order`]). `parameters` and `order` apply to a geometry only.
 ///
@@ -215,7 +218,15 @@ fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> S
     });
     let order = if order == Order::Quadratic { "Mesh.ElementOrder = 2;\n" } else { "" };
     let size = parameters.get("size").filter(|_| !bounds_by_size(text));
-    let size = size.map_or(String::new(), |size| format!("Mesh.MeshSizeMax = {size};\n"));
+    let [width, height] = ["X", "Y"].map(|axis| format!("General.Max{axis} - General.Min{axis}"));
+    let size = size.map_or(String::new(), |size| {
+        format!(
+            "Mesh.MeshSizeMax = {size};\nBoundingBox;\n\
+             If (({width}) * ({height}) / {size}^2 > {MOST_SQUARES:e})\n \
+             Error(\"size = {size} is too small for a body of %g by %g (in the unit of the geometry; gmsh reads \
+             .step in mm)\", {width}, {height});\n Exit;\nEndIf\n"
+        )
+    });
     checks.chain([order.to_owned(), size]).collect()
 }
 
