@@ -242,8 +242,9 @@ def main(prog=None):
     cut = words.index("--") if "--" in words else len(words)
     (arguments, others), more = parser.parse_known_args(words[:cut]), words[cut + 1:]
     if others:
-        parser.error(f"unrecognized arguments: {' '.join(others)}; options of `signorini run` follow --, "
-                     f"as in `-- {others[0]} …`")
+        print(f"error: unrecognized arguments: {' '.join(others)}; options of `signorini run` follow --, as in "
+              f"`-- {others[0]} …`", file=sys.stderr)
+        return 2
     head, cases = arguments.cases
     keys = [key for key, _ in arguments.set]
     if twice := next((key for key in head + keys if (head + keys).count(key) > 1), None):

@@ -187,18 +187,11 @@ impl SceneArguments {
         let is_chosen =
             |set: &&String| set.split('=').next().is_some_and(|key| CHOSEN.contains(&key.trim()));
         let unused = self.set.iter().filter(|_| scene.accuracy.is_some()).find(is_chosen);
-        let mut notes = Vec::from_iter(unused.map(|set| {
+        let notes = Vec::from_iter(unused.map(|set| {
             format!("--set {set} has no effect: the accuracy chooses the mesh and the time steps")
         }));
         if let Some(file) = &self.mesh {
-            let replaced = std::mem::replace(&mut scene.mesh, MeshSource::from_path(file));
-            if !replaced.parameters.is_empty() {
-                let unused: Vec<_> = replaced.parameters.into_keys().collect();
-                notes.push(format!(
-                    "of the scene's [mesh] nothing was used, because of --mesh: not {}",
-                    unused.join(", ")
-                ));
-            }
+            scene.mesh = MeshSource::from_path(file);
         }
         Ok((scene, notes))
     }
@@ -208,10 +201,6 @@ impl SceneArguments {
 /// a `.geo` is coarse.
 fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
-    if !file.exists() {
-        let problem = "No such file; mesh.file (relative to the scene) or --mesh names it";
-        return Err(Failure::input(format!("{}: {problem}", file.display())));
-    }
     let is_adapted = adapts && Format::of(file) == Some(Format::Geometry);
     let mesh = match scene.accuracy.filter(|_| is_adapted) {
         Some(accuracy) => estimate::first_mesh(scene, accuracy),

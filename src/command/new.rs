@@ -15,12 +15,6 @@ pub fn new(name: &Path) -> Result<(), Failure> {
         let name = name.display();
         return Err(Failure::input(format!("{name} is no name; write, say, `signorini new dam`")));
     };
-    if let Some(folder) =
-        name.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
-    {
-        let folder = folder.display();
-        return Err(Failure::input(format!("there is no folder {folder}; make it first")));
-    }
     let [geometry, scene] = [".geo", ".toml"].map(|extension| {
         let mut file = stem.to_owned();
         file.push(extension);

@@ -17,8 +17,8 @@ use crate::{
 /// the body: gmsh places nodes to about 1e-8 of an edge.
 const OUTWARD: f64 = 1e-6;
 
-/// The approximate number of evaluations of an expression in space and time before a run. They take less
-/// than a second.
+/// The approximate number of triangles and times for which an expression is evaluated before a run. They take
+/// about a second.
 const EVALUATIONS: usize = 4_000_000;
 
 /// The largest admissible value. The squares of larger values overflow.
@@ -48,7 +48,8 @@ impl Scene {
         }
         problems.extend(self.check_shared_edges(mesh));
         problems.extend(self.check_surfaces(mesh));
-        problems.extend(self.bad_values(mesh, &self.sample_times(1000)));
+        let times = (EVALUATIONS / mesh.triangles.len().max(1)).min(1000);
+        problems.extend(self.bad_values(mesh, &self.sample_times(times)));
         self.text.refuse(problems)
     }
 
@@ -213,9 +214,7 @@ impl Scene {
     }
 
     /// Whether the values of `expression` at `points` and `times` are finite and obey the `rule`. An
-    /// expression that does not depend on space or time is evaluated at one point or time only. If there are
-    /// too many points and times, all points are used at the first and the last time, and at the times
-    /// between them the points take turns.
+    /// expression that does not depend on space or time is evaluated at one point or time only.
     pub(super) fn check(
         &self,
         key: &str,
@@ -227,10 +226,8 @@ impl Scene {
         let (in_time, in_space) = (expression.depends_on_time(), expression.depends_on_space());
         let times = if in_time { times } else { &times[..times.len().min(1)] };
         let points = if in_space { points } else { &points[..points.len().min(1)] };
-        let parts = (points.len() * times.len()).div_ceil(EVALUATIONS).max(1);
-        for (i, &t) in times.iter().enumerate() {
-            let parts = if i == 0 || i + 1 == times.len() { 1 } else { parts };
-            for &[x, y] in points.iter().skip(i % parts).step_by(parts) {
+        for &t in times {
+            for &[x, y] in points {
                 let value = expression.eval(x, y, t);
                 if !(value.abs() <= LARGEST && holds(value)) {
                     let is_too_large = value.is_finite() && value.abs() > LARGEST;

@@ -79,5 +79,5 @@ fn a_new_scene_overwrites_nothing() {
     let checked = test_directory.say(&["check", &format!("{name}.toml")]);
     assert_eq!((checked.code, checked.err.as_str()), (Some(0), ""), "{checked:?}");
     let unwritable = ProgramOutput::of(&mut test_directory.command(&["new", "nowhere/wall"]));
-    unwritable.fails(2, &["there is no folder nowhere"]);
+    unwritable.fails(2, &["cannot write nowhere/", "No such file"]);
 }

@@ -86,7 +86,7 @@ fn a_fixed_normal_points_out_of_the_body_all_along_its_curve() {
         let place = format!("foundation.normal points {how} at (0, 1), where the outward");
         assert!(message.contains(&place), "{message}");
         assert!(
-            message.contains("normal is (-1.0000, 0.0000); restrict the physical"),
+            message.contains("normal is (-1.0000, 0.0000); it must point from the body"),
             "{message}"
         );
     };
