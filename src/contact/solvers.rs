@@ -139,11 +139,8 @@ pub const SOLVERS: [&str; 3] = [REGISTRY[0].name, REGISTRY[1].name, REGISTRY[2].
 
 /// There is no contact solver of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("there is no contact solver `{name}`{}", suggestion(name, &names()))]
-pub struct SolverError {
-    /// The name.
-    pub name: String,
-}
+#[error("there is no contact solver `{0}`{known}", known = suggestion(.0, &names()))]
+pub struct SolverError(pub String);
 
 /// `[contact]` of a scene: how the contact problem is solved.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -183,7 +180,7 @@ pub fn find(name: &str) -> Result<(&'static SolverEntry, &str), SolverError> {
         entry.name == solver && (name == solver || entry.variants.contains(&variant))
     };
     let found = REGISTRY.iter().find(known).map(|entry| (entry, variant));
-    found.ok_or_else(|| SolverError { name: name.to_owned() })
+    found.ok_or_else(|| SolverError(name.to_owned()))
 }
 
 /// The names that [`find`] knows.

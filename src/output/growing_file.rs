@@ -18,12 +18,11 @@ pub(super) struct GrowingFile {
     /// The number of bytes before the ending; `None` before the file exists. A restart sets the number of its
     /// checkpoint.
     pub(super) length: Option<u64>,
-    file: Option<File>,
 }
 
 impl GrowingFile {
     pub(super) fn new(path: PathBuf, beginning: String, ending: &'static str) -> Self {
-        Self { path, beginning, ending, length: None, file: None }
+        Self { path, beginning, ending, length: None }
     }
 
     /// Adds a piece.
@@ -36,10 +35,7 @@ impl GrowingFile {
             }
         };
         let failed = |error: io::Error| OutputError::new(&self.path, error);
-        let file = match self.file.take() {
-            Some(file) => file,
-            None => open(&self.path, length).map_err(failed)?,
-        };
+        let file = open(&self.path, length).map_err(failed)?;
         let text = [piece, self.ending.as_bytes()].concat();
         let written = file.write_all_at(&text, length);
         // A full disk may take a part of the piece. Then the old ending is written again.
@@ -50,7 +46,7 @@ impl GrowingFile {
         };
         let ended = restored.and_then(|()| file.set_len(length + self.ending.len() as u64));
         written.and(ended).map_err(failed)?;
-        (self.length, self.file) = (Some(length), Some(file));
+        self.length = Some(length);
         Ok(())
     }
 }

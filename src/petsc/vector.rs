@@ -91,6 +91,7 @@ impl Vector {
         let Some(prescribed) = prescribed else { return self.norm() };
         let squares = self.read(|v| {
             let mut start = 0;
+            let squares = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>();
             let mut before = |end: usize| squares(&v[mem::replace(&mut start, end + 1)..end]);
             prescribed.iter().map(|&unknown| before(unknown)).sum::<f64>() + before(v.len())
         })?;
@@ -115,16 +116,6 @@ impl Vector {
     pub fn owned(&self) -> usize {
         self.owned
     }
-}
-
-/// Σ v_i², in eight sums that the processor adds at a time.
-fn squares(v: &[f64]) -> f64 {
-    let (groups, rest) = v.as_chunks::<8>();
-    let mut sums = [0.0; 8];
-    for group in groups {
-        sums.iter_mut().zip(group).for_each(|(sum, v)| *sum += v * v);
-    }
-    sums.iter().sum::<f64>() + rest.iter().map(|v| v * v).sum::<f64>()
 }
 
 /// A number of entries in PETSc's integer type.

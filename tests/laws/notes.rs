@@ -161,7 +161,7 @@ fn an_unknown_solver_is_an_error() {
     let (session, problem) = (Session::start(&[]).unwrap(), pressed(0.0, "-1").unwrap());
     for name in ["simplex", "active-set:tron", "tao:", ""] {
         let run = Simulation::new(&problem).solver_named(name).run(&session);
-        assert!(matches!(&run, Err(RunError::Solver(SolverError { name: n })) if n == name));
+        assert!(matches!(&run, Err(RunError::Solver(SolverError(n))) if n == name));
     }
 }
 
