@@ -181,6 +181,8 @@ fn refusal(text: &str, name: &str, value: f64) -> Option<&'static str> {
     let defined = || includes || text.split(|c| !word(c)).any(|w| w == name);
     if !name.chars().all(word) || !name.starts_with(|c: char| !c.is_ascii_digit()) {
         Some("the name must consist of letters, digits and underscores")
+    } else if !value.is_finite() {
+        Some("the value must be finite")
     } else if name == "size" {
         (value <= 0.0).then_some("the size must be positive")
     } else {
