@@ -37,7 +37,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
 .PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run figures keys test validate random compare \
-    bench stability reference converge paper chart accuracy promises handbook \
+    bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
 help:
@@ -63,6 +63,7 @@ help:
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
 	@echo 'make handbook   published and closed answers, with bars and with --accuracy (minutes); or ARGS="hertz_plane"'
+	@echo 'make bounds     the proved bound on the error of u against true errors on 260 bodies (minutes)'
 	@echo 'make constants  the register of tuned constants, validation/CONSTANTS.md, from their comments'
 	@echo 'make architecture  the picture of the rooms of src, geo/rooms.svg, from their use lines'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
@@ -180,6 +181,9 @@ constants:
 
 architecture: deps
 	$(PYTHON) scripts/architecture.py geo/rooms.svg
+
+bounds: build
+	$(PYTHON) validation/bounds.py --binary $(BINARY) $(ARGS)
 
 handbook: build
 	$(PYTHON) validation/handbook.py --binary $(BINARY) $(ARGS)

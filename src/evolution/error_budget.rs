@@ -40,19 +40,15 @@ impl ErrorBudget {
     fn of_displacements(&self) -> String {
         let (estimate, reservations) =
             (percent(self.displacement_mesh), self.reservations.join(", "));
+        let proved = if self.can_be_damaged { "proved for this ζ" } else { "proved" };
         let error = match (self.displacement_bound, &reservations[..]) {
             // A bound of 100 % says nothing.
             (Some(1.0..), _) => format!("{estimate} (energy norm, estimated)"),
             (None, "") => format!("{estimate} (energy norm)"),
             (None, reason) => format!("{estimate} (energy norm, estimated: no proof, as {reason})"),
-            (Some(bound), "") => {
-                format!("at most {} (energy norm, proved for this ζ)", percent(bound))
-            }
+            (Some(bound), "") => format!("at most {} (energy norm, {proved})", percent(bound)),
             (Some(bound), left_out) => {
-                format!(
-                    "at most {} (energy norm, proved for this ζ, but {left_out})",
-                    percent(bound)
-                )
+                format!("at most {} (energy norm, {proved}, but {left_out})", percent(bound))
             }
         };
         format!("from the mesh: u {error}")

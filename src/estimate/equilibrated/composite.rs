@@ -17,15 +17,15 @@ use std::sync::LazyLock;
 pub(super) type SideForces = [[Vector2<f64>; 3]; 3];
 
 /// The quadrature points of the three parts, exact for polynomials of degree 5 (Radon, Monatsh. Math. 52, 1948).
-const POINTS: usize = 21;
+const RULE_SIZE: usize = 21;
 /// The components (σ_xx, σ_yy, σ_xy) of a stress at all points.
-const VALUES: usize = 3 * POINTS;
+const VALUES: usize = 3 * RULE_SIZE;
 
 /// The map from the forces on the reference triangle to the stresses in it, for tractions of degree k with D = 6k + 12
 /// components of forces, R = 4k + 4 of them on two sides.
 pub(super) struct Composite<const R: usize, const D: usize> {
     /// The barycentric coordinates of the points, and their weights as parts of |T|.
-    points: [([f64; 3], f64); POINTS],
+    points: [([f64; 3], f64); RULE_SIZE],
     /// The stresses at the points.
     stresses: SMatrix<f64, VALUES, D>,
     /// The stresses without forces, per parameter; none for k = 1.
@@ -140,7 +140,7 @@ impl<const R: usize, const D: usize> Composite<R, D> {
         let stresses = on.strains.map(|strain| to_reference * (on.d * strain));
         // 1/ζ ≤ its interpolation between the corners of a part.
         let centre = 3.0 / on.zeta.iter().sum::<f64>();
-        let weights: [f64; POINTS] = std::array::from_fn(|q| {
+        let weights: [f64; RULE_SIZE] = std::array::from_fn(|q| {
             let ((at, weight), [first, second, opposite]) = (self.points[q], corners_of(q));
             let of_corners = [first, second].map(|i| (at[i] - at[opposite]) / on.zeta[i]);
             weight * (of_corners.iter().sum::<f64>() + 3.0 * at[opposite] * centre)
@@ -280,9 +280,10 @@ impl<const R: usize, const D: usize> Composite<R, D> {
             }
         }
         let product = |i: usize, j: usize| {
-            let rows =
-                |of: usize| DMatrix::from_fn(POINTS, D, |q, force| stresses[(3 * q + of, force)]);
-            let weighted = DMatrix::from_fn(POINTS, D, |q, force| {
+            let rows = |of: usize| {
+                DMatrix::from_fn(RULE_SIZE, D, |q, force| stresses[(3 * q + of, force)])
+            };
+            let weighted = DMatrix::from_fn(RULE_SIZE, D, |q, force| {
                 weights[3 * q] * stresses[(3 * q + i, force)]
             });
             let product = weighted.transpose() * rows(j);
@@ -311,7 +312,7 @@ impl<const R: usize, const D: usize> Composite<R, D> {
 
 /// The first and second corner of the part in which the point q lies, and the corner opposite to it.
 fn corners_of(q: usize) -> [usize; 3] {
-    let s = q / (POINTS / 3);
+    let s = q / (RULE_SIZE / 3);
     [s, (s + 1) % 3, (s + 2) % 3]
 }
 
@@ -342,7 +343,7 @@ fn derivatives(degree: usize, [a, b, c]: [f64; 3]) -> Vec<[f64; 3]> {
 }
 
 /// Radon's rule of seven points in each part: the part, barycentric coordinates in it, and the weight as a part of |T|.
-fn rule() -> [(usize, [f64; 3], f64); POINTS] {
+fn rule() -> [(usize, [f64; 3], f64); RULE_SIZE] {
     let root = 15.0_f64.sqrt();
     let orbits = [(6.0 - root, 155.0 - root), (6.0 + root, 155.0 + root)];
     let mut rule = vec![([1.0 / 3.0; 3], 9.0 / 40.0)];

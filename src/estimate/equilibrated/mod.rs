@@ -50,7 +50,7 @@ pub type Unproved = &'static str;
 /// Forces without balance are rounding up to this fraction of all forces.
 ///
 /// The stars of all scenes of the handbook are balanced to 1e-9.
-const BALANCED: f64 = 1e-7;
+const IMBALANCE: f64 = 1e-7;
 /// A bound of this many times the estimate is good enough.
 const ENOUGH: f64 = 2.0;
 /// Another sweep over the stars pays if the last one has multiplied the square of the bound by less than this; and the most sweeps.
@@ -115,7 +115,7 @@ pub(crate) fn proved_error(
     }
     let (parts, imbalance) = found.unwrap_or_default();
     let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
-    if comm.total(imbalance).sqrt() > BALANCED * forces {
+    if comm.total(imbalance).sqrt() > IMBALANCE * forces {
         return Ok(Err("the stiffness is ill-conditioned"));
     }
     let mut tractions = summed(body, &parts);
@@ -157,7 +157,10 @@ pub(crate) fn proved_error(
         let all = comm.total(own);
         let relative = ((all + contact).sqrt() + of_moved) / size.sqrt();
         if relative <= ENOUGH * estimate || all > FALLS * before || sweep == MOST_SWEEPS {
-            return Ok(Ok(ProvedError { relative, left_out: left_out(problem, state.time) }));
+            return Ok(Ok(ProvedError {
+                relative,
+                left_out: left_out(problem, &edges, state.time),
+            }));
         }
         before = all;
     }
@@ -314,7 +317,7 @@ fn joined(body: &Body, before: Vec<SideForces>, after: Vec<SideForces>) -> Vec<S
 
 /// What the proof leaves out: functions of the scene that are no polynomials of the degrees that it takes, along the sides of
 /// the triangles. Collective.
-fn left_out(problem: &DiscreteProblem, time: f64) -> Vec<&'static str> {
+fn left_out(problem: &DiscreteProblem, edges: &[ContactEdge], time: f64) -> Vec<&'static str> {
     let (body, scene) = (&problem.body, problem.scene());
     let degree = if body.order() == Order::Quadratic { 2 } else { 1 };
     let point = |vertex: usize| Vector2::from(body.mesh.nodes[vertex]);
@@ -349,6 +352,7 @@ fn left_out(problem: &DiscreteProblem, time: f64) -> Vec<&'static str> {
     let parts = [
         (loads, "loads vary within triangles"),
         (values, "gaps or displacements vary between nodes"),
+        (edges.iter().any(|edge| edge.is_turned), "the contact surface turns at nodes"),
     ];
     parts.into_iter().filter_map(|(found, name)| comm.any(found).then_some(name)).collect()
 }

@@ -8,6 +8,7 @@ use super::Side;
 use crate::{
     fem::RigidMotion,
     problem::{ContactRow, DiscreteProblem, State},
+    scene::Boundary,
 };
 use nalgebra::{DMatrix, DVector, Vector2};
 use rustc_hash::FxHashMap as HashMap;
@@ -36,6 +37,8 @@ pub(super) struct ContactEdge {
     pressures: [f64; 3],
     gaps: [f64; 3],
     length: f64,
+    /// Differs ν at an end from the normal of the edge, as where Γ_C is curved?
+    pub(super) is_turned: bool,
     /// Has the contact rows at both ends?
     has_rows: [bool; 2],
     /// Is it this rank that counts the edge? The rank of the end with the smaller global number does.
@@ -68,15 +71,18 @@ impl Foundation {
             let mut parts = rows.chunk_by(|a, b| a.boundary == b.boundary);
             parts.find(|rows| rows[0].boundary == name).unwrap_or_default()
         };
-        let of_boundary = |name: &str| Self::new(problem, rows_of(name), name, sides);
-        boundaries.map(|boundary| of_boundary(&boundary.name)).collect()
+        let of_boundary = |boundary: &Boundary| {
+            let normal = boundary.gap().and_then(|gap| gap.normal);
+            Self::new(problem, rows_of(&boundary.name), (&boundary.name, normal), sides)
+        };
+        boundaries.map(of_boundary).collect()
     }
 
-    /// The boundary `name` with its `rows`, which every rank has.
+    /// The boundary `name` with its `rows`, which every rank has, and with the normal of its gap if that is fixed.
     fn new(
         problem: &DiscreteProblem,
         rows: &[ContactRow],
-        name: &str,
+        (name, normal): (&str, Option<[f64; 2]>),
         sides: &HashMap<[usize; 2], Side>,
     ) -> Self {
         let (body, mesh) = (&problem.body, problem.mesh());
@@ -105,7 +111,8 @@ impl Foundation {
             let nodes = edge.map(|vertex| vertices[vertex]);
             let side = sides.get(&[nodes[0].min(nodes[1]), nodes[0].max(nodes[1])])?;
             let piece = piece(edge.map(|vertex| own.nodes[vertex]));
-            Some(ContactEdge::new(problem, (rows, &pressures), &piece, nodes, side))
+            let outward = normal.map_or(side.1, Vector2::from);
+            Some(ContactEdge::new(problem, (rows, &pressures), &piece, nodes, (side.0[2], outward)))
         });
         let edges = Vec::from_iter(edges);
         // The first rank counts the rows, and each rank the reactions of its nodes without a row.
@@ -166,14 +173,16 @@ impl ContactEdge {
         (rows, pressures): (&[ContactRow], &[f64]),
         piece: &Piece,
         [start, end]: [usize; 2],
-        (nodes, outward): &Side,
+        (middle_node, outward): (Option<usize>, Vector2<f64>),
     ) -> Self {
+        /// Normals at a larger angle, rad, differ.
+        const TURNED: f64 = 1e-6;
         let (partition, points) = (&problem.body.nodes.partition, &problem.body.nodes.points);
         let [first, middle, last] = piece.rows;
         let ends = [first.or(last), last.or(first)];
         let of_end = |k: usize| ends[k].map_or(0.0, |row| pressures[row]);
         let normal = |row: Option<usize>| {
-            row.map_or(*outward, |row| Vector2::new(rows[row].normal_x, rows[row].normal_y))
+            row.map_or(outward, |row| Vector2::new(rows[row].normal_x, rows[row].normal_y))
         };
         let gap = |row: Option<usize>| row.map_or(0.0, |row| rows[row].gap.max(0.0));
         let (a, b) = (gap(first), gap(last));
@@ -182,12 +191,13 @@ impl ContactEdge {
         let number = |node: &usize| partition.global(*node, 1, 0);
         let owner = [start, end].into_iter().min_by_key(number);
         Self {
-            nodes: [Some(start), nodes[2], Some(end)],
+            nodes: [Some(start), middle_node, Some(end)],
             places: [from, [0, 1].map(|k| 0.5 * (from[k] + to[k])), to],
             normals: [normal(ends[0]), normal(middle.or(ends[0])), normal(ends[1])],
             pressures: [of_end(0), middle.map_or(0.0, |row| pressures[row]), of_end(1)],
             gaps: [a, middle.map_or(mean, |row| 2.0 * gap(Some(row)) - mean), b],
             length: piece.length,
+            is_turned: ends.iter().any(|end| (normal(*end) - outward).norm() > TURNED),
             has_rows: [first, last].map(|row| row.is_some()),
             is_own: owner.is_some_and(|node| node < partition.owned()),
         }
