@@ -88,7 +88,8 @@ fn find_and_declare() -> Result<(), String> {
 
     let flags = |word: &&String| word.starts_with("-I") || word.starts_with("-D");
     let flags: Vec<String> = words.iter().filter(flags).cloned().collect();
-    let variables = "PETSC_COMM_WORLD|M_ARENA_MAX|ompi_mpi_\\w+|SIGNORINI_\\w+";
+    let variables =
+        "PETSC_COMM_WORLD|M_ARENA_MAX|M_MMAP_MAX|M_MMAP_THRESHOLD|ompi_mpi_\\w+|SIGNORINI_\\w+";
     let values = MPI
         .map(|[kind, name, _]| format!("static const MPI_{kind} SIGNORINI_{name} = MPI_{name};\n"));
     let headers = format!(

@@ -40,11 +40,15 @@ impl Session {
         // CHOLMOD asks OpenMP for 4 threads in very short loops, whatever OMP_NUM_THREADS says. Waking them
         // would take a third of a factorisation's time. The setting is one of each thread.
         // Each thread would reserve 64 MB of address space for a heap of its own.
+        // SuperLU_DIST, which PETSc loads, lets the heap keep all freed memory, although small blocks split it up. Blocks of at
+        // least 32 MB, glibc's largest threshold, go back to the system as soon as they are freed.
         // SAFETY: only sets parameters.
         #[cfg(target_os = "linux")]
         unsafe {
             raw::omp_set_max_active_levels(0);
             raw::mallopt(raw::M_ARENA_MAX, 1);
+            raw::mallopt(raw::M_MMAP_MAX, 1 << 16);
+            raw::mallopt(raw::M_MMAP_THRESHOLD, 32 << 20);
         }
         let mut running = options::petsc_bool(false);
         // SAFETY: PetscInitialized may be called at any time.
