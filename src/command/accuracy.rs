@@ -3,7 +3,7 @@
 use super::{Failure, screen, task::Task};
 use signorini::{
     estimate::{self, AdaptError, Adapted, Extreme, KINKS_OF_TABLE, Measured},
-    evolution::{AIM, Choices, Outcome, Step, percent},
+    evolution::{Choices, Outcome, Step, percent},
     interrupt::Signal,
     mesh::{Mesh, Order},
     petsc::Session,
@@ -101,26 +101,6 @@ fn interrupted(signal: Signal) -> Failure {
     Failure { code: signal.exit_code(), message: Some(message) }
 }
 
-/// The factor for the tolerance of the time steps in a second run, if the time steps of the first one miss the required
-/// accuracy and the mesh leaves them a part of it. It is at most ½, and at least 1/64: the error of a step is of third order,
-/// so there are then about four times as many steps.
-pub(super) fn shorter_steps(task: &Task, outcome: &Outcome) -> Option<f64> {
-    let accuracy = task.problem.scene().accuracy?;
-    let bars = task.measured.bars.iter().zip(&outcome.bars);
-    let bars = bars.filter(|(bar, _)| is_asked(task, &bar.name));
-    let bars = bars.map(|(of_mesh, of_both)| [of_mesh.relative(), of_both.relative()]);
-    let of_stop = outcome
-        .stopped
-        .map(|stop| [stop.from_mesh.unwrap_or(0.0), stop.bar()].map(|bar| bar / stop.time));
-    let factor = bars.chain(of_stop).map(|[of_mesh, of_both]| match of_both {
-        error if error > accuracy => AIM * (accuracy - of_mesh) / (error - of_mesh),
-        _ => 1.0,
-    });
-    let limit = if is_unconfirmed_stop(task, outcome) { 0.5 } else { 1.0 };
-    let factor = factor.fold(limit, f64::min);
-    (0.0 < factor && factor < 1.0).then_some(factor.clamp(1.0 / 64.0, 0.5))
-}
-
 /// Is there time to repeat a run of some `seconds` with a tolerance of the steps that is smaller by `ratio`? Their errors are of
 /// second order. Collective.
 pub(super) fn has_time(task: &Task, seconds: f64, ratio: f64) -> bool {
@@ -132,12 +112,6 @@ pub(super) fn has_time(task: &Task, seconds: f64, ratio: f64) -> bool {
 /// Whether the run stops at ζ_*, but the runs that measure the errors of the mesh do not: the time steps may cause the stop.
 fn is_unconfirmed_stop(task: &Task, outcome: &Outcome) -> bool {
     outcome.stopped.is_some() && task.measured.stop.is_none()
-}
-
-/// Whether the accuracy is required for this figure.
-fn is_asked(task: &Task, name: &str) -> bool {
-    let asked = &task.problem.scene().accuracy_of;
-    asked.is_empty() || asked.iter().any(|known| known == name)
 }
 
 /// A note on error bars that are missing although the errors from the mesh were measured.
@@ -196,7 +170,7 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
         names => format!("accuracy {accuracy} of {}", names.join(", ")),
     };
     let Some(outcome) = outcome else { return Some((false, format!("{asked}: {mesh}"))) };
-    let bars = outcome.bars.iter().filter(|bar| is_asked(task, &bar.name));
+    let bars = outcome.bars.iter().filter(|bar| scene.requires_accuracy_of(&bar.name));
     let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
     let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
     let of_stop = outcome.stopped.map(|stop| ("stopped_at".to_owned(), stop.bar() / stop.time));
@@ -212,7 +186,7 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     let unconfirmed = "only this run stops at ζ_*, not the runs that measure its errors".to_owned();
     let unconfirmed = is_unconfirmed_stop(task, outcome).then_some(unconfirmed);
     // Only the limit on the time prevents a repetition.
-    let is_last = task.repeats || shorter_steps(task, outcome).is_none();
+    let is_last = task.repeats || outcome.shorter_steps(&task.problem, &task.measured).is_none();
     let limit = "a repetition with shorter steps would take longer than --max-seconds".to_owned();
     let limit = (!is_last).then_some(limit);
     let missing = missing_bars(task, outcome);

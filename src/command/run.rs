@@ -2,7 +2,7 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, confirm_stop, has_time, measure_errors, shorter_steps},
+    accuracy::{adapt, confirm_stop, has_time, measure_errors},
     check::contact_nodes,
     check_petsc,
     checkpoint::Checkpoint,
@@ -230,7 +230,8 @@ fn solve(
     loop {
         let started = Instant::now();
         let (recorder, result) = solve_once(&task, restart.take(), session)?;
-        let ratio = result.as_ref().ok().and_then(|outcome| shorter_steps(&task, outcome));
+        let shorter = |outcome: &Outcome| outcome.shorter_steps(&task.problem, &task.measured);
+        let ratio = result.as_ref().ok().and_then(shorter);
         let seconds = session.comm().max(started.elapsed().as_secs_f64());
         let ratio = ratio.filter(|ratio| has_time(&task, seconds, *ratio));
         match (result, ratio) {
@@ -238,7 +239,8 @@ fn solve(
                 drop(recorder);
                 confirm_stop(session, &mut task, &outcome)?;
                 if let Some(adapted) = &mut task.adapted {
-                    adapted.steps *= ratio;
+                    // Lengths of steps are on a ladder: a factor near 1 may change none.
+                    adapted.steps *= ratio.min(0.5);
                     task.problem.set_step_tolerance(adapted.steps);
                 }
                 task.repeats = true;

@@ -26,6 +26,7 @@ mod sequence;
 mod sizes;
 
 use crate::{
+    estimate::Simulation,
     evolution::{Choices, RunError},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
@@ -130,6 +131,9 @@ impl AdaptError {
 ///
 /// Tuned on the 13 adapted runs. Half: 1 % more triangles. Twice: 2 % fewer, a quarter fewer for `square`.
 const FEW_STEP_TOLERANCE: f64 = 0.05;
+/// The tolerance of the time steps is found on the first mesh with at most this estimated error of u. On coarser ones the
+/// contact and the damage are other ones.
+const COARSE: f64 = 0.1;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 25;
 
@@ -153,7 +157,7 @@ pub fn adapted(
         .time
         .iter_mut()
         .for_each(|grid| grid.stepping = Stepping::Uniform { steps: INSTANTS });
-    let scene = with_passing_loads(session, few_steps, &mesh, accuracy)?;
+    let scene = with_passing_loads(session, few_steps, &mesh)?;
     let mut reached = None;
     let refined = refined(session, scene, mesh, choices, accuracy, &mut |mesh| {
         seen(mesh);
@@ -175,7 +179,6 @@ fn with_passing_loads(
     session: &Session,
     mut scene: Scene,
     mesh: &Mesh,
-    accuracy: f64,
 ) -> Result<Scene, AdaptError> {
     let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
     let figures = problem.figures.iter().filter(|of| of.dimension.has_bar());
@@ -185,7 +188,7 @@ fn with_passing_loads(
         return Err(AdaptError::Overturns { time });
     }
     if LoadCurve::pass_within_steps(&problem) {
-        make_steps_adaptive(&mut scene, accuracy);
+        make_steps_adaptive(&mut scene);
     }
     Ok(scene)
 }
@@ -211,7 +214,7 @@ pub fn measured_errors(
         };
     }
     if of_steps.is_none() {
-        few_steps = with_passing_loads(session, few_steps, mesh, FEW_STEP_TOLERANCE)?;
+        few_steps = with_passing_loads(session, few_steps, mesh)?;
     }
     let mesh = Refinement::start(mesh.clone()).mesh;
     let mut limits = Limits::new(session.comm(), scene);
@@ -222,8 +225,9 @@ pub fn measured_errors(
         let run = limits.measure(triangles, run);
         let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
         let repeats = of_steps.is_none() && run.stop().is_some();
-        if !repeats || !make_steps_adaptive(&mut few_steps, FEW_STEP_TOLERANCE) {
-            let new = Measurement::new(session, &mesh, &run, choices, &[], None, &mut limits);
+        if !repeats || !make_steps_adaptive(&mut few_steps) {
+            let answer = Level::new(&run, mesh);
+            let new = Measurement::new(session, &answer, &run, choices, &[], None, &mut limits);
             return Ok(new?.result());
         }
     }
@@ -243,7 +247,7 @@ fn refined(
     let mut refinement = Refinement::start(mesh);
     let mut rounds = 0;
     let (mut progress, mut limits) = (Progress::new(accuracy), Limits::new(session.comm(), &scene));
-    let mut before: Vec<Level> = Vec::new();
+    let (mut before, mut last): (Vec<Level>, Option<Measurement>) = Default::default();
     loop {
         rounds += 1;
         let mesh = &refinement.mesh;
@@ -252,19 +256,25 @@ fn refined(
         let run = || FewStepRun::run(session, &problem, choices, triangles, INSTANTS, &[]);
         let run = limits.measure(triangles, run);
         let run = run.map_err(|source| AdaptError::Run { triangles, source })?;
-        if run.stop().is_some() && make_steps_adaptive(&mut scene, accuracy) {
+        if run.stop().is_some() && make_steps_adaptive(&mut scene) {
             before.clear();
             continue;
         }
         let round = Round::new(&scene, mesh, run, accuracy)?;
         progress.estimated(triangles, round.resolves_data().then_some(round.error));
+        let answer = Level::new(&round.run, mesh.clone());
         // The measured errors, or the reason why there are none.
-        let measure = |progress: &mut Progress, limits: &mut Limits| {
+        let mut measure = |progress: &mut Progress, limits: &mut Limits| {
             if let Some(limit) = limits.exceeded(&[4 * triangles]) {
                 return Ok(Err(limit));
             }
-            let (run, accuracy) = (&round.run, Some(accuracy));
-            match Measurement::new(session, mesh, run, choices, &before, accuracy, limits) {
+            let run = &round.run;
+            let again = last.take().and_then(|last| last.on_refined(&before, &answer, run));
+            if let Some(again) = again.filter(|of| of.excess(accuracy, &scene.accuracy_of) <= 1.0) {
+                return Ok(Ok(progress.measured(triangles, again)));
+            }
+            let accuracy = Some(accuracy);
+            match Measurement::new(session, &answer, run, choices, &before, accuracy, limits) {
                 Ok(measured) => Ok(Ok(progress.measured(triangles, measured))),
                 Err(error) if error.signal().is_some() => Err(error),
                 Err(error) => Ok(Err(error.to_string())),
@@ -297,24 +307,62 @@ fn refined(
         if not_reached.is_some() && !is_enough {
             measured = measure(&mut progress, &mut limits)?.ok();
         }
-        let adapted = round.adapted(measured.as_ref(), rounds, not_reached);
+        let mut adapted = round.adapted(measured.as_ref(), rounds, not_reached);
         seen(&adapted);
-        let level = Level::new(&round.run, mesh.clone());
         match next {
             Some(finer) => {
-                before.push(level);
-                refinement = finer;
+                before.push(answer);
+                (refinement, last) = (finer, measured);
             }
-            None => return Ok(adapted),
+            None => {
+                set_steps(session, scene, &before, choices, &mut adapted)?;
+                return Ok(adapted);
+            }
         }
     }
 }
 
 /// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.
-fn make_steps_adaptive(scene: &mut Scene, accuracy: f64) -> bool {
+fn make_steps_adaptive(scene: &mut Scene) -> bool {
     let Some(grid) = &mut scene.time else { return false };
     let uniform = matches!(grid.stepping, Stepping::Uniform { .. });
-    grid.stepping =
-        Stepping::Auto { tolerance: FEW_STEP_TOLERANCE.min(2.0 * accuracy), expected: [0.0; 2] };
+    grid.stepping = Stepping::Auto { tolerance: FEW_STEP_TOLERANCE, expected: [0.0; 2] };
     uniform
+}
+
+/// Sets the tolerance of the time steps of an adapted mesh by runs on one of the meshes `before`: the errors of the time steps
+/// hardly depend on the mesh. If such a run fails or stops elsewhere, the tolerance stays. Collective.
+fn set_steps(
+    session: &Session,
+    mut scene: Scene,
+    before: &[Level],
+    choices: &Choices,
+    adapted: &mut Adapted,
+) -> Result<(), AdaptError> {
+    let triangles = adapted.mesh.triangles.len();
+    let is_cheap =
+        |level: &&Level| level.error <= COARSE && 4 * level.mesh.triangles.len() <= triangles;
+    let coarse = before.iter().find(is_cheap);
+    let (Some(grid), Some(Level { mesh, .. })) = (&mut scene.time, coarse) else { return Ok(()) };
+    let tolerance =
+        if adapted.measured.stop.is_some() { FEW_STEP_TOLERANCE } else { adapted.steps };
+    grid.stepping = Stepping::Auto { tolerance, expected: adapted.damage };
+    let mut problem = DiscreteProblem::new(scene, mesh.clone())?.restrict(session)?;
+    let mut steps = tolerance;
+    // The accuracy may leave the steps hardly anything.
+    while steps >= tolerance / 64.0 {
+        problem.set_step_tolerance(steps);
+        let run = Simulation::new(&problem).choices(choices).run(session);
+        let Ok(mut outcome) = run else { return Ok(()) };
+        outcome.set_bars(&problem, &adapted.measured)?;
+        if outcome.stopped.is_some() != adapted.measured.stop.is_some() {
+            return Ok(());
+        }
+        match outcome.shorter_steps(&problem, &adapted.measured) {
+            Some(ratio) => steps *= ratio,
+            None => break,
+        }
+    }
+    adapted.steps = steps;
+    Ok(())
 }

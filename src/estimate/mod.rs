@@ -31,7 +31,7 @@ pub use recovery::{EnergyError, RecoveredStrains};
 pub use simulation::Simulation;
 
 use crate::{
-    evolution::{ErrorBudget, Outcome, Run, RunError},
+    evolution::{AIM, ErrorBudget, Outcome, Run, RunError},
     petsc::PetscError,
     problem::{Bar, DiscreteProblem, State},
 };
@@ -110,6 +110,27 @@ impl Outcome {
         problem.add_step_errors(&mut self.bars, &now, last, of_steps)?;
         problem.join_bars(&mut self.bars, &self.last.figures);
         Ok(())
+    }
+
+    /// The factor for the tolerance of the time steps with which a run is within the required accuracy, if the time steps of
+    /// this one take more than the part that the `measured` errors of the mesh leave. It is at least 1/64: the error of a step is of
+    /// third order, so there are then about four times as many steps.
+    pub fn shorter_steps(&self, problem: &DiscreteProblem, measured: &Measured) -> Option<f64> {
+        let accuracy = problem.scene().accuracy?;
+        let bars = measured.bars.iter().zip(&self.bars);
+        let bars = bars.filter(|(bar, _)| problem.scene().requires_accuracy_of(&bar.name));
+        let bars = bars.map(|(of_mesh, of_both)| [of_mesh.relative(), of_both.relative()]);
+        let of_stop = self
+            .stopped
+            .map(|stop| [stop.from_mesh.unwrap_or(0.0), stop.bar()].map(|bar| bar / stop.time));
+        let factor = bars.chain(of_stop).map(|[of_mesh, of_both]| {
+            let (of_steps, left) = (of_both - of_mesh, accuracy - of_mesh);
+            if of_steps > left { AIM * left / of_steps } else { 1.0 }
+        });
+        // The time steps alone may cause a stop that no run has measured.
+        let limit = if self.stopped.is_some() && measured.stop.is_none() { 0.5 } else { 1.0 };
+        let factor = factor.fold(limit, f64::min);
+        (0.0 < factor && factor < 1.0).then_some(factor.max(1.0 / 64.0))
     }
 
     /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end

@@ -74,6 +74,11 @@ impl Scene {
         self.text.refuse(outside.iter().map(problem).collect())
     }
 
+    /// Is the accuracy required for the figure or norm `name`?
+    pub fn requires_accuracy_of(&self, name: &str) -> bool {
+        self.accuracy_of.is_empty() || self.accuracy_of.iter().any(|known| known == name)
+    }
+
     /// Checks that the figures in `accuracy_of` are among the `known` ones.
     ///
     /// # Errors

@@ -2,6 +2,9 @@
 //!
 //! The three meshes give the bars ([`Sequence`]). If no mesh before was much coarser, a mesh bisected twice is the third. All
 //! runs of a measurement take the same time steps, so that these cause no change.
+//!
+//! If the errors are too large, the answer on the bisected mesh serves the next mesh too. Only if its errors are then still too
+//! large, or its time steps others, this mesh is bisected itself.
 
 use super::{
     AdaptError, Measured,
@@ -17,6 +20,7 @@ use crate::{
     petsc::Session,
     problem::{Bar, Dimension, DiscreteProblem, Figure},
 };
+use std::slice::from_ref;
 
 /// The fraction of the accuracy of a figure that the mesh may use; the time steps use the rest.
 ///
@@ -94,18 +98,20 @@ pub(super) struct Measurement {
     of_points: Vec<Extreme>,
     /// The probes with their points, m.
     probes: Vec<(String, [f64; 2])>,
+    /// The mesh bisected everywhere and the answer there.
+    finer: Option<(Refinement, Level)>,
 }
 
 impl Measurement {
-    /// Measures the errors of the run `coarse` on `mesh` by the same run on finer meshes, and by the answers on the meshes
-    /// `before`. A mesh bisected twice is left out if it exceeds the `limits`, and if two meshes show already whether the
+    /// Measures the errors of the run `coarse`, with this `answer`, by the same run on finer meshes, and by the answers on the
+    /// meshes `before`. A mesh bisected twice is left out if it exceeds the `limits`, and if two meshes show already whether the
     /// `accuracy` is reached. Collective.
     ///
     /// # Errors
     /// A triangle cannot be bisected, or the run on the finer mesh fails.
     pub(super) fn new(
         session: &Session,
-        mesh: &Mesh,
+        answer: &Level,
         coarse: &FewStepRun,
         choices: &Choices,
         before: &[Level],
@@ -117,28 +123,27 @@ impl Measurement {
             let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?;
             problem.restrict(session).map_err(AdaptError::from)
         };
-        let finer = Refinement::start(mesh.clone()).refine_everywhere()?;
+        let finer = Refinement::start(answer.mesh.clone()).refine_everywhere()?;
         let triangles = finer.mesh.triangles.len();
         let of_fine = problem(&finer.mesh)?;
         let run = || FewStepRun::run(session, &of_fine, choices, triangles, FEW, coarse.times());
         let failed = |source| AdaptError::Run { triangles, source };
         let fine = limits.measure(triangles, run).map_err(failed)?;
-        let answer = Level::new(coarse, mesh.clone());
         let mut levels = vec![Level::new(&fine, finer.mesh.clone())];
-        let two = Sequence::new(before, &answer, &levels);
-        let mut measured = Self::of_fields(&two, mesh, &finer, coarse, &fine);
+        let two = Sequence::new(before, answer, &levels, true);
+        let mut measured = Self::of_fields(&two, &finer, [answer, &levels[0]], coarse, &fine);
         measured.set_bars(&two, coarse, &fine);
         let misses = |measured: &Self| {
-            let errors = measured.errors(&scene.accuracy_of);
-            accuracy.zip(errors.first()).is_some_and(|(a, worst)| worst.excess(a) > 1.0)
+            accuracy.is_some_and(|accuracy| measured.excess(accuracy, &scene.accuracy_of) > 1.0)
         };
-        if two.has_coarser() || misses(&measured) {
-            return Ok(measured);
+        let is_done = two.has_coarser() || misses(&measured);
+        if !is_done {
+            measured.set_bars(&two.slower(), coarse, &fine);
         }
-        measured.set_bars(&two.slower(), coarse, &fine);
         let triangles = 4 * triangles;
         let is_decided = accuracy.is_some() && triangles > CHEAP && !misses(&measured);
-        if is_decided || limits.exceeded(&[triangles]).is_some() {
+        if is_done || is_decided || limits.exceeded(&[triangles]).is_some() {
+            measured.finer = levels.pop().map(|fine| (finer, fine));
             return Ok(measured);
         }
         let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
@@ -146,16 +151,39 @@ impl Measurement {
         let run = || FewStepRun::run(session, &problem, choices, triangles, FEW, coarse.times());
         if let Ok(run) = limits.measure(triangles, run) {
             levels.push(Level::new(&run, finest));
-            measured.set_bars(&Sequence::new(before, &answer, &levels), coarse, &fine);
+            measured.set_bars(&Sequence::new(before, answer, &levels, true), coarse, &fine);
         }
         Ok(measured)
+    }
+
+    /// The errors of the run `coarse` with this `answer` on a refinement of the measured mesh, the last one `before`, from the
+    /// same finer mesh. `None` for other time steps and for runs that stop. Collective.
+    pub(super) fn on_refined(
+        &self,
+        before: &[Level],
+        answer: &Level,
+        coarse: &FewStepRun,
+    ) -> Option<Self> {
+        let (finer, fine) = self.finer.as_ref().filter(|_| self.stop.is_none())?;
+        let is_like = coarse.stop().is_none() && answer.times == before.last()?.times;
+        let sequence = is_like.then(|| Sequence::new(before, answer, from_ref(fine), false))?;
+        let mut measured = Self { displacement: self.displacement, ..Self::default() };
+        if coarse.problem.damage().is_some() {
+            let [shares, largest] = damage(answer, finer, fine);
+            // The error left on the finer mesh is a part of that of the mesh before.
+            measured.damage = shares.iter().sum::<f64>().sqrt() + sequence.rate() * self.damage;
+            measured.zeta = largest;
+        }
+        (measured.extremes, measured.unsettled) = (self.extremes.clone(), self.unsettled.clone());
+        measured.set_bars_of_settled(&sequence, coarse);
+        Some(measured)
     }
 
     /// The errors of u and ζ, without bars of figures. Collective.
     fn of_fields(
         sequence: &Sequence,
-        mesh: &Mesh,
         finer: &Refinement,
+        [answer, finer_answer]: [&Level; 2],
         coarse: &FewStepRun,
         fine: &FewStepRun,
     ) -> Self {
@@ -167,7 +195,7 @@ impl Measurement {
         measured.displacement = displacement;
         // The squared error of order p on the whole triangle is 4^p times the sum on its parts.
         let growth = if problem.scene().order == Order::Quadratic { 16.0 } else { 4.0 };
-        measured.shares = vec![0.0; mesh.triangles.len()];
+        measured.shares = vec![0.0; answer.mesh.triangles.len()];
         measured.depths = measured.shares.clone();
         for ((&parent, share), depth) in
             finer.parent_of_triangle.iter().zip(of_parts).zip(fine.depths())
@@ -179,8 +207,8 @@ impl Measurement {
             return measured;
         }
         if problem.damage().is_some() {
-            let [shares, largest] = damage(mesh, finer, coarse, fine);
-            let square = sequence.error_over_change().powi(2);
+            let [shares, largest] = damage(answer, finer, finer_answer);
+            let square = (1.0 - sequence.rate()).powi(-2);
             measured.of_damage = shares.iter().map(|share| square * share).collect();
             measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
             measured.zeta = largest;
@@ -197,7 +225,7 @@ impl Measurement {
         if self.stop.is_some() {
             return;
         }
-        let problem = coarse.problem;
+        let problem = fine.problem;
         // The extreme of the whole settles if that of its part does.
         let settles = |extreme: &&Extreme| {
             let part = problem.part_of(extreme.number, fine.values());
@@ -206,12 +234,18 @@ impl Measurement {
         };
         let unsettled = self.of_points.iter().filter(|of| !settles(of));
         self.unsettled = unsettled.map(|of| of.name.clone()).collect();
+        self.set_bars_of_settled(sequence, coarse);
+    }
+
+    /// Sets the bars of the figures that the meshes settle. Collective.
+    fn set_bars_of_settled(&mut self, sequence: &Sequence, coarse: &FewStepRun) {
+        let problem = coarse.problem;
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
             dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
-        self.bars = problem.bars(&errors, &fine.scales(&self.unsettled));
+        self.bars = problem.bars(&errors, &coarse.scales(&self.unsettled));
         self.bars.retain(|bar| !self.unsettled.contains(&bar.name));
         problem.join_bars(&mut self.bars, coarse.values());
     }
@@ -242,6 +276,11 @@ impl Measurement {
         Measured { bars: self.bars.clone(), unsettled: self.unsettled.clone(), stop, damage }
     }
 
+    /// The largest measured error in `names`, or of all, over the error that the `accuracy` allows; infinite without errors.
+    pub(super) fn excess(&self, accuracy: f64, names: &[String]) -> f64 {
+        self.errors(names).first().map_or(f64::INFINITY, |worst| worst.excess(accuracy))
+    }
+
     /// The measured errors of the figures and norms in `names`, or of all: the figures, u, the damage
     /// and the time of ζ_*. The largest error over its share comes first.
     pub(super) fn errors(&self, names: &[String]) -> Vec<MeasuredError> {
@@ -258,12 +297,6 @@ impl Measurement {
             .collect();
         errors.sort_by(|a, b| (b.relative / b.share).total_cmp(&(a.relative / a.share)));
         errors
-    }
-
-    /// The part of `accuracy` that the mesh leaves to the time steps. These change the figures of ζ most.
-    pub(super) fn left_to_steps(&self, accuracy: f64) -> f64 {
-        let bars = self.bars.iter().filter(|bar| bar.dimension.is_damage());
-        accuracy - bars.map(Bar::relative).fold(0.0, f64::max).min(SHARE * accuracy)
     }
 
     /// The cause of the error of the figure `name`.

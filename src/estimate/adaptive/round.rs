@@ -113,7 +113,6 @@ impl<'a> Round<'a> {
             let errors = measured.errors(&self.scene.accuracy_of).into_iter();
             errors.map(|error| (error.name, error.relative)).next()
         };
-        let of_steps = MAX_SHARE_OF_STEPS * self.accuracy;
         Adapted {
             mesh: self.mesh.clone().in_morton_order(),
             unknowns: 2 * self.run.problem.body.nodes.partition.total(),
@@ -121,12 +120,7 @@ impl<'a> Round<'a> {
             error: self.error,
             damage_error: self.run.problem.damage().and(measured).map(|of| of.damage),
             damage: self.run.damage(),
-            steps: match measured {
-                Some(measured) if self.run.stop().is_none() => {
-                    (measured.left_to_steps(self.accuracy) / AIM).min(of_steps)
-                }
-                _ => of_steps,
-            },
+            steps: MAX_SHARE_OF_STEPS * self.accuracy,
             measured: measured.map_or_else(Measured::default, Measurement::result),
             worst: measured.and_then(worst),
             not_reached,

@@ -6,6 +6,8 @@
 //! 1.5 (max(|F_n − F_m|, |F_{m−1} − F_m|, min_{i<n} ρ_i |F_i − F_m|) + |F_m − F_{m−1}| r/(1 − r)),
 //! r = η_m/η_{m−1},   ρ_i = min(1, (η_n/η_i)²).
 //!
+//! If the finest mesh is that of a measurement before, then the mesh m − 1 that was bisected to it comes before the mesh n.
+//!
 //! The last term is the sum of all further changes if they fall like η. The error of a figure is a product of two errors in
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
@@ -25,9 +27,13 @@ const SLOWEST: f64 = 0.85;
 
 /// The answer of a run on a mesh.
 pub(super) struct Level {
-    mesh: Mesh,
+    pub(super) mesh: Mesh,
+    /// ζ at the end, at the nodes of the mesh.
+    pub(super) zeta: Vec<f64>,
+    /// The times at which steps end, s.
+    pub(super) times: Vec<f64>,
     /// η.
-    error: f64,
+    pub(super) error: f64,
     /// The figures at the end.
     values: Vec<f64>,
     /// The length of the part of Γ_C on which the ends of contact may lie, m.
@@ -37,10 +43,17 @@ pub(super) struct Level {
 }
 
 impl Level {
+    /// The answer of `run` on `mesh`. Collective.
     pub(super) fn new(run: &FewStepRun, mesh: Mesh) -> Self {
         let (error, _) = run.relative();
+        let (mut zeta, of_triangles) = (vec![1.0; mesh.nodes.len()], run.zeta());
+        for (t, nodes) in mesh.triangles.iter().enumerate() {
+            nodes.iter().zip(&of_triangles).for_each(|(&node, of)| zeta[node] = of[t]);
+        }
         Self {
             mesh,
+            zeta,
+            times: run.times().to_vec(),
             error,
             values: run.values().iter().map(|of| of.value).collect(),
             open: run.open_length(),
@@ -52,26 +65,32 @@ impl Level {
 /// The answers on meshes from the coarsest to the finest one.
 pub(super) struct Sequence<'a> {
     levels: Vec<&'a Level>,
-    /// The number of the mesh of the answer.
+    /// The number of the mesh of the answer, and of the mesh that was bisected to the finest one.
     answer: usize,
+    bisected: usize,
     /// r.
     rate: f64,
 }
 
 impl<'a> Sequence<'a> {
     /// From the answers on the meshes `before` that of the `answer`, on this one and on the `finer` ones, at least one. Meshes
-    /// on which a run stops, and this one not, do not count.
-    pub(super) fn new(before: &'a [Level], answer: &'a Level, finer: &'a [Level]) -> Self {
+    /// on which a run stops, and this one not, do not count. The mesh of the answer, or else the last one `before` it, was
+    /// bisected to the first finer one.
+    pub(super) fn new(
+        before: &'a [Level],
+        answer: &'a Level,
+        finer: &'a [Level],
+        is_bisected: bool,
+    ) -> Self {
         let is_like = |level: &&Level| level.stop.is_some() == answer.stop.is_some();
         let mut levels: Vec<&Level> = before.iter().filter(is_like).collect();
         let number = levels.len();
         levels.push(answer);
         levels.extend(finer);
-        let rate = match &levels[levels.len() - 2..] {
-            [a, b] if b.error < SLOWEST * a.error => b.error / a.error,
-            _ => SLOWEST,
-        };
-        Self { levels, answer: number, rate }
+        let bisected = levels.len() - if is_bisected { 2 } else { 3 };
+        let [coarse, fine] = [bisected, levels.len() - 1].map(|number| levels[number].error);
+        let rate = if fine < SLOWEST * coarse { fine / coarse } else { SLOWEST };
+        Self { levels, answer: number, bisected, rate }
     }
 
     /// The same meshes, if the changes fall like h^½ at most, as at a crack: two meshes alone do not show how they fall.
@@ -85,9 +104,9 @@ impl<'a> Sequence<'a> {
         before.iter().any(|level| level.error >= 2.0 * answer.error)
     }
 
-    /// The error of a field over its change in the last bisection, if it falls like η.
-    pub(super) fn error_over_change(&self) -> f64 {
-        1.0 / (1.0 - self.rate)
+    /// r.
+    pub(super) fn rate(&self) -> f64 {
+        self.rate
     }
 
     /// The bar with the factor `safety`, from the `difference` of a figure between a level and the finest one.
@@ -102,9 +121,10 @@ impl<'a> Sequence<'a> {
             };
             ratio * ratio * difference(level, finest)
         });
-        let changes = Vec::from_iter(from_answer.iter().map(|level| difference(level, finest)));
-        let largest = changes.iter().copied().chain(weighted.reduce(f64::min)).fold(0.0, f64::max);
-        safety * (largest + changes[changes.len() - 1] * self.rate / (1.0 - self.rate))
+        let changes = from_answer.iter().map(|level| difference(level, finest));
+        let largest = changes.chain(weighted.reduce(f64::min)).fold(0.0, f64::max);
+        let last = difference(self.levels[self.bisected], finest);
+        safety * (largest + last * self.rate / (1.0 - self.rate))
     }
 
     /// The bar of the figure `i`, which may be a stress.
