@@ -133,7 +133,7 @@ impl AdaptError {
 const FEW_STEP_TOLERANCE: f64 = 0.05;
 /// The tolerance of the time steps is found on the first mesh with at most this estimated error of u. On coarser ones the
 /// contact and the damage are other ones.
-const COARSE: f64 = 0.1;
+const MESH_FOR_STEPS: f64 = 0.1;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 25;
 
@@ -340,8 +340,9 @@ fn set_steps(
     adapted: &mut Adapted,
 ) -> Result<(), AdaptError> {
     let triangles = adapted.mesh.triangles.len();
-    let is_cheap =
-        |level: &&Level| level.error <= COARSE && 4 * level.mesh.triangles.len() <= triangles;
+    let is_cheap = |level: &&Level| {
+        level.error <= MESH_FOR_STEPS && 4 * level.mesh.triangles.len() <= triangles
+    };
     let coarse = before.iter().find(is_cheap);
     let (Some(grid), Some(Level { mesh, .. })) = (&mut scene.time, coarse) else { return Ok(()) };
     let tolerance =

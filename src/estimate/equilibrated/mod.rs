@@ -26,7 +26,7 @@ use crate::{
     fem::{Body, for_elements},
     mesh::{Order, sorted},
     petsc::PetscError,
-    problem::{DiscreteProblem, State},
+    problem::{DiscreteProblem, ElementLoads, State},
     scene::{Condition, Expression},
 };
 use composite::{Frame, LoadedTriangle, SideForces};
@@ -59,8 +59,8 @@ const ENOUGH: f64 = 2.0;
 /// needs a second one.
 const FALLS: f64 = 0.95;
 const MOST_SWEEPS: usize = 16;
-/// The residual of the correction w relative to its right-hand side.
-const CORRECTION: f64 = 1e-10;
+/// The residual of the correction w, relative to all forces.
+const CORRECTION: f64 = 0.1 * IMBALANCE;
 
 /// The nodes of an edge of the boundary in increasing order, the middle last, and its outward normal.
 type Side = ([Option<usize>; 3], Vector2<f64>);
@@ -85,7 +85,15 @@ pub(crate) fn proved_error(
         return Ok(Err("nothing is deformed"));
     }
     // The pressure, and an admissible u_h.
-    let sides = sides(body);
+    let vertices = body.node_of_vertex();
+    let corners =
+        Vec::from_iter(body.mesh.triangles.iter().map(|t| t.map(|vertex| vertices[vertex])));
+    let stars = Star::all(&corners, partition.owned());
+    if comm.any(stars.is_none()) {
+        return Ok(Err("parts of the body touch in a point"));
+    }
+    let stars = stars.unwrap_or_default();
+    let sides = sides(body, &stars);
     let mut foundations = Foundation::all(problem, state, &sides);
     let load = problem.load(state.time);
     if !pressure::balance(problem, &mut foundations, &load) {
@@ -102,19 +110,19 @@ pub(crate) fn proved_error(
     let internal = terms.internal_force(body, &points, &state.u);
     let rest = load.iter().zip(&contact).zip(&internal).map(|((f, p), k)| f + p - k).collect();
     let held = contact_step.holding();
-    let (_, w) = contact_step.corrected(&points, rest, &held, CORRECTION)?;
+    let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
+    let (_, w) = contact_step.corrected(&points, rest, &held, |_| CORRECTION * forces)?;
     let corrected: Vec<f64> = state.u.iter().zip(&w).map(|(u, w)| u + w).collect();
     // The tractions.
     let zeta = Vec::from_iter(state.zeta.iter().map(|zeta| problem.truncated(*zeta)));
-    let triangles = stressed(problem, [&points, &zeta], &corrected, state.time);
-    let boundary = boundary(problem, &edges, &sides, state.time);
-    let stars = Star::all(&triangles, partition.owned());
-    let found = stars.as_ref().and_then(|stars| stars::tractions(&triangles, stars, &boundary));
+    let loads = problem.loads.by_elements(body, state.time);
+    let triangles = stressed(problem, [&points, &zeta], &corrected, &loads);
+    let boundary = boundary(problem, &edges, &sides, &loads);
+    let found = stars::tractions(&triangles, &stars, &boundary);
     if comm.any(found.is_none()) {
-        return Ok(Err("parts of the body touch in a point"));
+        return Ok(Err("a part of the boundary is not known"));
     }
     let (parts, imbalance) = found.unwrap_or_default();
-    let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
     if comm.total(imbalance).sqrt() > IMBALANCE * forces {
         return Ok(Err("the stiffness is ill-conditioned"));
     }
@@ -122,7 +130,6 @@ pub(crate) fn proved_error(
     for (sides, triangle) in tractions.iter_mut().zip(&triangles) {
         (0..3).for_each(|s| sides[s][2] = triangle.bubble(s, (s + 1) % 3));
     }
-    let stars = stars.unwrap_or_default();
     // The stresses, with better tractions as long as these pay.
     let strains = body.strains(&admitted);
     let per_triangle = strains.len() / body.triangles.len();
@@ -179,21 +186,20 @@ fn is_curved(body: &Body) -> bool {
     body.quadratic_nodes().is_some_and(|nodes| nodes.iter().any(bends))
 }
 
-/// The sides of the triangles that belong to no other triangle, by their ends in increasing order.
-fn sides(body: &Body) -> HashMap<[usize; 2], Side> {
+/// The sides on the boundary with an end that this rank owns, by their ends in increasing order.
+fn sides(body: &Body, stars: &[Star]) -> HashMap<[usize; 2], Side> {
     let points = &body.nodes.points;
-    let mut sides = HashMap::<[usize; 2], Option<Side>>::default();
-    for_elements!(body, cells => for nodes in cells.nodes {
-        for s in 0..3 {
+    let side = |(t, s): (usize, usize)| {
+        for_elements!(body, cells => {
+            let nodes = &cells.nodes[t];
             let (a, b) = (nodes[s], nodes[(s + 1) % 3]);
             let along = Vector2::from(points[b]) - Vector2::from(points[a]);
             let normal = Vector2::new(along.y, -along.x).normalize();
             let [first, last] = sorted([a, b]);
-            let side = ([Some(first), Some(last), nodes.get(3 + s).copied()], normal);
-            sides.entry([first, last]).and_modify(|known| *known = None).or_insert(Some(side));
-        }
-    });
-    sides.into_iter().filter_map(|(ends, side)| Some((ends, side?))).collect()
+            ([first, last], ([Some(first), Some(last), nodes.get(3 + s).copied()], normal))
+        })
+    };
+    stars.iter().flat_map(Star::boundary_sides).map(side).collect()
 }
 
 /// The triangles with stresses that have the same forces at the nodes as those of the stiffness matrix: affine between the vertices
@@ -202,10 +208,9 @@ fn stressed(
     problem: &DiscreteProblem,
     [zeta_at_points, zeta_at_vertices]: [&[f64]; 2],
     u: &[f64],
-    time: f64,
+    loads: &ElementLoads,
 ) -> Vec<StressedTriangle> {
     let (body, elasticity) = (&problem.body, &problem.terms.elasticity);
-    let loads = problem.loads.by_elements(body, time);
     let strains = body.strains(u);
     let per_triangle = strains.len() / body.triangles.len();
     let vertices = body.node_of_vertex();
@@ -243,15 +248,15 @@ fn boundary(
     problem: &DiscreteProblem,
     edges: &[ContactEdge],
     sides: &HashMap<[usize; 2], Side>,
-    time: f64,
+    loads: &ElementLoads,
 ) -> HashMap<[usize; 2], BoundaryEdge> {
     let body = &problem.body;
     let vertices = body.node_of_vertex();
     let mut boundary: HashMap<[usize; 2], BoundaryEdge> =
         sides.keys().map(|ends| (*ends, BoundaryEdge::default())).collect();
-    for (ends, load) in problem.loads.by_elements(body, time).edges {
+    for (ends, load) in &loads.edges {
         let [a, b, middle] = load.map(Vector2::from);
-        let Some(edge) = boundary.get_mut(&ends) else { continue };
+        let Some(edge) = boundary.get_mut(ends) else { continue };
         edge.forces = [a + 0.5 * middle, b + 0.5 * middle];
     }
     for contact in edges {

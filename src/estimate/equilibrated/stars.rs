@@ -105,27 +105,39 @@ pub(super) struct Star {
 }
 
 impl Star {
-    /// The stars of the first `owned` nodes. `None` if a vertex has two, where parts of the body touch in a point.
-    pub(super) fn all(triangles: &[StressedTriangle], owned: usize) -> Option<Vec<Self>> {
-        let corners = triangles.iter().enumerate();
-        let corners =
-            corners.flat_map(|(t, triangle)| [0, 1, 2].map(|i| (triangle.nodes[i], t, i)));
-        let mut corners = Vec::from_iter(corners.filter(|(node, ..)| *node < owned));
-        corners.sort_unstable();
-        let star = |corners: &[(usize, usize, usize)]| {
-            let mut star = Vec::from_iter(corners.iter().map(|&(_, t, i)| (t, i)));
-            let node = |(t, i): (usize, usize), k: usize| triangles[t].nodes[(i + k) % 3];
-            let is_first = |j: &usize| star.iter().all(|&of| node(of, 2) != node(star[*j], 1));
-            let first = (0..star.len()).find(is_first);
-            star.swap(0, first.unwrap_or(0));
-            for j in 1..star.len() {
-                let end = node(star[j - 1], 2);
-                let next = (j..star.len()).find(|&k| node(star[k], 1) == end)?;
-                star.swap(j, next);
+    /// The stars of the first `owned` nodes, with the nodes at the vertices of all triangles. `None` if a vertex has two stars, where
+    /// parts of the body touch in a point.
+    pub(super) fn all(nodes: &[[usize; 3]], owned: usize) -> Option<Vec<Self>> {
+        let mut around = vec![Vec::new(); owned];
+        for (t, of) in nodes.iter().enumerate() {
+            for (i, node) in of.iter().enumerate().filter(|(_, node)| **node < owned) {
+                around[*node].push((t, i));
             }
-            Some(Self { node: corners[0].0, triangles: star, is_closed: first.is_none() })
+        }
+        let star = |(node, mut triangles): (usize, Vec<(usize, usize)>)| {
+            let other = |(t, i): (usize, usize), k: usize| nodes[t][(i + k) % 3];
+            let is_first =
+                |j: &usize| triangles.iter().all(|&of| other(of, 2) != other(triangles[*j], 1));
+            let first = (0..triangles.len()).find(is_first);
+            triangles.swap(0, first.unwrap_or(0));
+            for j in 1..triangles.len() {
+                let end = other(triangles[j - 1], 2);
+                let next = (j..triangles.len()).find(|&k| other(triangles[k], 1) == end)?;
+                triangles.swap(j, next);
+            }
+            Some(Self { node, triangles, is_closed: first.is_none() })
         };
-        corners.chunk_by(|a, b| a.0 == b.0).map(star).collect()
+        let vertices = around.into_iter().enumerate().filter(|(_, around)| !around.is_empty());
+        vertices.map(star).collect()
+    }
+
+    /// The sides of its triangles on the boundary: the triangle, and the number of the vertex at which the side starts.
+    pub(super) fn boundary_sides(&self) -> impl Iterator<Item = (usize, usize)> {
+        let ends = [
+            self.triangles.first().copied(),
+            self.triangles.last().map(|&(t, i)| (t, (i + 2) % 3)),
+        ];
+        ends.into_iter().flatten().filter(|_| !self.is_closed)
     }
 
     /// The node at the other end of the first side of triangle j, or of the last side of the last triangle.

@@ -107,7 +107,7 @@ impl<'a> ContactStep<'a> {
         let active = constraints.bounds.iter().zip(flags).filter(|(_, active)| *active > 0.0);
         let active: Vec<_> = active.map(|(bound, _)| bound.dof).collect();
         // With an old factor, the error may have one digit less than the residual.
-        let (solved, correction) = self.corrected(&zeta, forces, &active, 0.01)?;
+        let (solved, correction) = self.corrected(&zeta, forces, &active, |norm| 0.01 * norm)?;
         accuracy.gave_up = solved.gave_up;
         accuracy.displacement = match solved.converged {
             true => partition.max_norm(&correction) / max,
@@ -116,14 +116,14 @@ impl<'a> ContactStep<'a> {
         Ok(accuracy)
     }
 
-    /// K⁻¹ f for nodal `forces` f, with ζ at the quadrature points and the unknowns `held` at zero, up to a residual of
-    /// `reduction` ‖f‖. Collective.
+    /// K⁻¹ f for nodal `forces` f, with ζ at the quadrature points and the unknowns `held` at zero, up to the residual that
+    /// `limit` gives for ‖f‖. Collective.
     pub(crate) fn corrected(
         &mut self,
         zeta: &[f64],
         mut forces: Vec<f64>,
         held: &[usize],
-        reduction: f64,
+        limit: impl Fn(f64) -> f64,
     ) -> Result<(SolveReport, Vec<f64>), PetscError> {
         let Self { problem, stiffness, elastic, load, c, .. } = self;
         let DiscreteProblem { body, constraints, .. } = problem;
@@ -139,7 +139,7 @@ impl<'a> ContactStep<'a> {
             scale: stiffness.scale,
             ..LinearSystem::of(&stiffness.matrix)
         };
-        let limit = reduction * load.norm()?;
+        let limit = limit(load.norm()?);
         let solved = elastic.solve_renewing(system, load, c, limit)?;
         Ok((solved, displacement(problem, vec![0.0; forces.len()], c)?))
     }
