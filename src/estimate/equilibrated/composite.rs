@@ -89,11 +89,12 @@ impl<const R: usize, const D: usize> Composite<R, D> {
     /// ∫ σ : A⁻¹ σ as a bilinear form of the forces on both sides at the vertex i and of all forces, as in [`Self::ordered`], for a
     /// [`Frame::metric`].
     pub(super) fn form(&self, i: usize, metric: &Matrix3<f64>) -> SMatrix<f64, R, D> {
-        let [a, b, c, d, e, f] = &self.products[i];
-        let [p, q, r, s, t, u] = PAIRS.map(|at| metric[at]);
-        let mut form = SMatrix::zeros();
-        for k in 0..R * D {
-            form[k] = p * a[k] + q * b[k] + r * c[k] + s * d[k] + t * e[k] + u * f[k];
+        let mut form = SMatrix::<f64, R, D>::zeros();
+        for (product, at) in self.products[i].iter().zip(PAIRS) {
+            let factor = metric[at];
+            for (sum, part) in form.as_mut_slice().iter_mut().zip(product.as_slice()) {
+                *sum += factor * part;
+            }
         }
         form
     }
