@@ -50,7 +50,9 @@ fn estimated(run: Run) -> Result<Outcome, RunError> {
     let proof = phases.time("proof", || {
         equilibrated::proved_error(&mut contact_step, &state, outcome.accuracy.energy)
     })?;
-    if let Ok(proof) = &proof {
+    if let Ok(proof) = &proof
+        && proof.left_out.is_empty()
+    {
         outcome.accuracy.energy = outcome.accuracy.energy.min(proof.relative);
     }
     outcome.penetration = phases.time("accuracy", || {

@@ -42,14 +42,18 @@ impl ErrorBudget {
             (percent(self.displacement_mesh), self.reservations.join(", "));
         let proved = if self.can_be_damaged { "proved for this ζ" } else { "proved" };
         let error = match (self.displacement_bound, &reservations[..]) {
-            // A bound of 100 % says nothing.
-            (Some(1.0..), _) => format!("{estimate} (energy norm, estimated)"),
+            (Some(bound @ 1.0..), "") => format!(
+                "at most {} (energy norm, {proved}): useless, the mesh is too coarse or its triangles are \
+                 too stretched",
+                percent(bound)
+            ),
+            (Some(bound), "") => format!("at most {} (energy norm, {proved})", percent(bound)),
+            (Some(bound), left_out) => format!(
+                "about {} (energy norm, a bound without proof, as {left_out})",
+                percent(bound)
+            ),
             (None, "") => format!("{estimate} (energy norm)"),
             (None, reason) => format!("{estimate} (energy norm, estimated: no proof, as {reason})"),
-            (Some(bound), "") => format!("at most {} (energy norm, {proved})", percent(bound)),
-            (Some(bound), left_out) => {
-                format!("at most {} (energy norm, {proved}, but {left_out})", percent(bound))
-            }
         };
         format!("from the mesh: u {error}")
     }

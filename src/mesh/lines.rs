@@ -53,6 +53,17 @@ impl<'a> Lines<'a> {
         Self::new(mesh, |_| ())
     }
 
+    /// Are some straight edges chords of curves? The tangents at their ends then have other directions.
+    pub fn have_chords(&self) -> bool {
+        let turns = |a: usize, b: usize| {
+            let ([p, q], [x, y]) = ([a, b].map(|node| self.mesh.nodes[node]), self.tangent(a, b));
+            let [along_x, along_y] = [q[0] - p[0], q[1] - p[1]];
+            let cross = x * along_y - y * along_x;
+            cross.abs() > SAME_DIRECTION * x.hypot(y) * along_x.hypot(along_y)
+        };
+        self.ends.iter().any(|(a, others)| others.iter().any(|b| turns(*a, *b)))
+    }
+
     /// Is the line from p over the node to q smooth there?
     pub fn is_smooth(&self, node: usize, [p, q]: [usize; 2]) -> bool {
         let is_known = !self.mesh.points.is_empty();

@@ -91,6 +91,8 @@ pub struct DiscreteProblem {
     nodal_stress: OnceLock<Arc<NodalStress>>,
     /// max ‖·‖₂ of the nodal loads over sampled times of the run, N per metre of thickness.
     pub(crate) largest_load: f64,
+    /// Has the mesh chords in the place of curved sides?
+    pub(crate) has_chords: bool,
     /// KKT tolerance.
     pub tolerance: f64,
     /// The numbers and names of the materials of the body.
@@ -151,7 +153,9 @@ impl DiscreteProblem {
         let norms = (scene.sample_times(SAMPLE_TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
+        let has_chords = lines.have_chords();
         let mut problem = Self {
+            has_chords,
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
             terms: conditions.terms,

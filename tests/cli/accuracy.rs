@@ -275,6 +275,40 @@ fn error_bars_hold_on_curved_sides() {
     }
 }
 
+#[test]
+fn a_hole_of_any_size_begins_with_a_mesh_whose_triangles_are_not_folded() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "scene.toml",
+        "mesh = { file = 'hole.geo', size = 2 }
+         material = { young = 210e3, poisson = 0.3, plane = 'stress' }
+         boundary = [
+            { name = 'left', displacement = [0, 0] },
+            { name = 'right', traction = [10, 0] },
+         ]",
+    );
+    for radius in [1, 2, 4, 6] {
+        directory.write(
+            "hole.geo",
+            &format!(
+                "DefineConstant[ size = {{2}} ];
+                 Point(1)={{0,0,0}};Point(2)={{100,0,0}};Point(3)={{100,20,0}};Point(4)={{0,20,0}};
+                 Line(1)={{1,2}};Line(2)={{2,3}};Line(3)={{3,4}};Line(4)={{4,1}};
+                 Point(20)={{80,10,0}};
+                 Point(21)={{80+{radius},10,0}};Point(22)={{80,10+{radius},0}};
+                 Point(23)={{80-{radius},10,0}};Point(24)={{80,10-{radius},0}};
+                 Circle(11)={{21,20,22}};Circle(12)={{22,20,23}};
+                 Circle(13)={{23,20,24}};Circle(14)={{24,20,21}};
+                 Curve Loop(1)={{1:4}};Curve Loop(2)={{11:14}};Plane Surface(1)={{1,2}};
+                 Physical Surface(\"b\")={{1}};
+                 Physical Curve(\"left\")={{4}};Physical Curve(\"right\")={{2}};\n"
+            ),
+        );
+        let said = directory.run(&["--accuracy", "0.05"]);
+        assert!(said.out.contains("accuracy 0.05 reached"), "{radius}: {}{}", said.out, said.err);
+    }
+}
+
 /// Writes the scene of a homogeneous square bar on two symmetric sides, with this condition at its top.
 pub fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
     directory.write(

@@ -213,10 +213,10 @@ fn quadratic_displacements_under_a_rolling_load() {
         let (many, one) = (error("many"), error("one"));
         assert!((many / one - 1.0).abs() < 1e-6, "{name}: {many} is not {one}");
     }
-    // The ranks improve the tractions at their interface at the same time, which gives another bound.
+    // The ranks improve the tractions in another order, which gives nearly the same bound.
     let bound = |out| directory.summary(out)["errors"]["displacement_bound"].as_f64().unwrap();
     let (many, one) = (bound("many"), bound("one"));
-    assert!((0.9..1.6).contains(&(many / one)), "{many} is far from {one}");
+    assert!((0.9..1.1).contains(&(many / one)), "{many} is far from {one}");
 }
 
 #[test]

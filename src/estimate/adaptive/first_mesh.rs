@@ -36,16 +36,26 @@ pub fn kinks(scene: &Scene, mesh: &Mesh, accuracy: f64) -> Vec<(f64, Kink)> {
 /// # Errors
 /// gmsh cannot mesh the `.geo`.
 pub fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, MeshError> {
-    /// Triangles along the body.
+    /// Triangles along the body, and the most of them where fewer are folded by the curved sides of a hole.
     const CELLS: f64 = 4.0;
+    const MOST_CELLS: f64 = 64.0;
     /// Meshes that are graded towards angles, as the third power holds for small ones, corners stay, and gmsh may fail.
     const GRADINGS: usize = 8;
     let MeshSource { file, parameters } = &scene.mesh;
     let usual = mesh::load(file, parameters, Order::Linear)?;
     let scaling = mesh::scaling_factor(file)?;
     let mut parameters = parameters.clone();
-    parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / CELLS);
-    let mut first = mesh::load(file, &parameters, Order::Quadratic)?;
+    let mut of_cells = |cells: f64| {
+        parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / cells);
+        mesh::load(file, &parameters, Order::Quadratic)
+    };
+    let mut cells = CELLS;
+    let mut first = loop {
+        match of_cells(cells) {
+            Err(MeshError::File { .. }) if cells < MOST_CELLS => cells *= 2.0,
+            made => break made?,
+        }
+    };
     // The smallest ratio of the sizes in one grading. gmsh fails at some strong ones.
     let mut ratio = 0.25_f64;
     for grading in 0..GRADINGS {

@@ -17,16 +17,17 @@ use rustc_hash::FxHashMap as HashMap;
 /// What does not change: the triangles, the stars, and the edges of the boundary.
 type Known<'a> = (&'a [StressedTriangle], &'a [Star], &'a HashMap<[usize; 2], BoundaryEdge>);
 
-/// Improves the tractions in the stars, one after the other. The numbers are those of [`Composite`] and C = 4k + 1, the
+/// Improves the tractions in the stars that are wanted, one after the other. The numbers are those of [`Composite`] and C = 4k + 1, the
 /// functions in a triangle.
 pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
     composite: &Composite<R, D>,
     (triangles, stars, boundary): Known,
+    is_wanted: &dyn Fn(&Star) -> bool,
     forces: &mut [SideForces],
 ) {
     // The functions of a side, and those before them.
     let (of_side, of_centre) = ((C - 3) / 2, 3);
-    for star in stars {
+    for star in stars.iter().filter(|star| is_wanted(star)) {
         let count = star.triangles.len() + usize::from(!star.is_closed);
         // Can the traction change on the side j?
         let is_free = |j: usize| {
