@@ -239,8 +239,9 @@ fn solve(
                 drop(recorder);
                 confirm_stop(session, &mut task, &outcome)?;
                 if let Some(adapted) = &mut task.adapted {
-                    // Lengths of steps are on a ladder: a factor near 1 may change none.
-                    adapted.steps *= ratio.min(0.5);
+                    // Lengths of steps are on a ladder of √2, and their errors are of second order: an error
+                    // may be twice the one asked for.
+                    adapted.steps *= 0.5 * ratio;
                     task.problem.set_step_tolerance(adapted.steps);
                 }
                 task.repeats = true;
