@@ -91,7 +91,7 @@ pub struct DiscreteProblem {
     nodal_stress: OnceLock<Arc<NodalStress>>,
     /// max ‖·‖₂ of the nodal loads over sampled times of the run, N per metre of thickness.
     pub(crate) largest_load: f64,
-    /// Has the mesh chords in the place of curved sides?
+    /// Are some straight sides chords of a curved boundary?
     pub(crate) has_chords: bool,
     /// KKT tolerance.
     pub tolerance: f64,

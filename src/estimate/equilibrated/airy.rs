@@ -14,7 +14,7 @@ use crate::mesh::sorted;
 use nalgebra::{DMatrix, DVector, SMatrix, Vector2};
 use rustc_hash::FxHashMap as HashMap;
 
-/// What does not change: the triangles, the stars, and the edges of the boundary.
+/// The triangles, the stars, and the edges of the boundary. None of them changes.
 type Known<'a> = (&'a [StressedTriangle], &'a [Star], &'a HashMap<[usize; 2], BoundaryEdge>);
 
 /// Improves the tractions in the stars that are wanted, one after the other. The numbers are those of [`Composite`] and C = 4k + 1, the

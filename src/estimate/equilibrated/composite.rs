@@ -42,7 +42,7 @@ const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 
 pub(super) struct Frame {
     /// J⁻¹, 1/m.
     pub(super) inverse: Matrix2<f64>,
-    /// P of σ = P σ̂ in components, J σ̂ Jᵀ/det J, 1 without unit.
+    /// The matrix P with σ = P σ̂ in components, where σ = J σ̂ Jᵀ/det J; without unit.
     to_physical: Matrix3<f64>,
     /// |T|, m².
     area: f64,

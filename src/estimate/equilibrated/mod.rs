@@ -44,22 +44,20 @@ pub struct ProvedError {
     pub left_out: Vec<&'static str>,
 }
 
-/// A reason why there is no bound.
+/// The reason why a run has no bound, as a part of a sentence.
 pub type Unproved = &'static str;
 
-/// Forces without balance are rounding up to this fraction of all forces.
-///
-/// The stars of all scenes of the handbook are balanced to 1e-9.
+/// Without balance, forces up to this fraction of all forces are rounding, or the residual of the correction.
 const IMBALANCE: f64 = 1e-7;
 /// A bound of this many times the estimate is good enough.
 const ENOUGH: f64 = 2.0;
 /// Another sweep over the stars pays if the last one has multiplied the square of the bound by less than this; and the most sweeps.
 ///
-/// They serve stretched triangles and nearly incompressible materials, where a sweep halves the square, and no other scene
-/// needs a second one.
+/// They serve stretched triangles and nearly incompressible materials: in `locking` of the handbook 16 sweeps lower the bound from
+/// 4.1 to 1.2 times the error.
 const FALLS: f64 = 0.95;
 const MOST_SWEEPS: usize = 16;
-/// The sweeps over the stars at the interfaces of ranks. They serve no body on one rank.
+/// The sweeps over the stars at the interfaces of ranks. With them two and three ranks print nearly the bound of one.
 const INTERFACE_SWEEPS: usize = 4;
 /// The residual of the correction w, relative to all forces.
 const CORRECTION: f64 = 0.1 * IMBALANCE;
@@ -187,7 +185,7 @@ pub(crate) fn proved_error(
     unreachable!("the last sweep returns")
 }
 
-/// Has the body curved sides?
+/// Does a side of a triangle differ from its chord?
 fn is_curved(body: &Body) -> bool {
     let points = &body.nodes.points;
     let bends = |nodes: &[usize; 6]| {
@@ -256,7 +254,7 @@ fn stressed(
     (0..body.triangles.len()).map(of_triangle).collect()
 }
 
-/// What is known on the edges of the boundary.
+/// The forces of loads and contact on the edges of the boundary, and the directions in which supports hold them.
 fn boundary(
     problem: &DiscreteProblem,
     edges: &[ContactEdge],

@@ -127,7 +127,7 @@ impl Foundation {
 }
 
 /// The coefficients p ≥ 0 of the rows: those of ½ ∫ p² − Σ p R that is least, with the forces R of the functions of the coefficients.
-/// By Gauss and Seidel with projection: ∫ b_i b_j has a condition near 10.
+/// The method of Gauss and Seidel, in which a negative p becomes 0.
 fn nearest(rows: &[ContactRow], pieces: &[Piece]) -> Vec<f64> {
     const SWEEPS: usize = 60;
     let mut forces: Vec<f64> = rows.iter().map(|row| row.force).collect();
@@ -305,7 +305,7 @@ fn scale(
     motions: &[RigidMotion],
     target: &DVector<f64>,
 ) -> bool {
-    /// Each time some p becomes 0.
+    /// In each round but the last one some p becomes 0. Bodies that need more rounds have no bound.
     const TIMES: usize = 10;
     let (comm, count) = (problem.body.nodes.partition.comm(), motions.len());
     // ν·m at the place `at`, with ν of the place k of an edge.

@@ -32,7 +32,7 @@ pub(super) struct StressedTriangle {
     pub(super) bubbles: [Vector2<f64>; 3],
 }
 
-/// What is known on an edge of the boundary.
+/// An edge of the boundary, where the traction is known except for the reactions of supports.
 #[derive(Default)]
 pub(super) struct BoundaryEdge {
     /// The directions in which supports give reactions.
@@ -57,12 +57,12 @@ impl BoundaryEdge {
 }
 
 impl StressedTriangle {
-    /// σ v for a stress.
+    /// The product σ v of a stress and a vector.
     fn apply(stress: &Vector3<f64>, [x, y]: [f64; 2]) -> Vector2<f64> {
         Vector2::new(stress[0] * x + stress[2] * y, stress[2] * x + stress[1] * y)
     }
 
-    /// ρ of the vertex i.
+    /// The force ρ that both sides at the vertex i have to bear, N per metre of thickness.
     fn rest(&self, i: usize) -> Vector2<f64> {
         let mean = self.stresses.iter().sum::<Vector3<f64>>() / 3.0;
         self.area * Self::apply(&mean, self.gradients[i]) - self.body[i]
@@ -166,7 +166,8 @@ pub(super) fn tractions(
     Some((forces, imbalance))
 }
 
-/// Adds the tractions of a star; |its imbalance|². `None` if its boundary is not known.
+/// Adds the tractions of a star to `forces`. Returns the square of the force without balance, N², or `None` if nothing is known of
+/// an edge of the boundary.
 fn add_star(
     triangles: &[StressedTriangle],
     of: &Star,
