@@ -66,7 +66,7 @@ def main():
         found = pool.map(lambda of: errors(study, *of[1:]), wanted)
         rows = [(name, order, of) for (name, _, order), of in zip(wanted, found)]
     names = ["scene", "order", "triangles", "bound", "estimate", "truth", "ratio", "left out", "seconds", "of a step"]
-    held, wrong, ratios, estimates = 0, [], [], []
+    wrong, ratios, estimates = [], {"proved": [], "without proof": []}, []
     with open(out / "bounds.csv", "w", newline="") as file:
         table = csv.writer(file)
         table.writerow(names)
@@ -80,20 +80,26 @@ def main():
                             *of["seconds"]])
             if ratio is None or truth < ROUNDING:
                 continue
+            if left_out:
+                ratios["without proof"].append((ratio, f"{name} P{order} ({'; '.join(left_out)})"))
+                continue
+            ratios["proved"].append((ratio, f"{name} P{order}"))
             estimates.append(of["estimate"] / truth)
-            if ratio < 1 - ROUNDING and not left_out:
+            if ratio < 1 - ROUNDING:
                 wrong.append(f"{name} P{order}: {bound:.3e} proved, {truth:.3e} true")
-            else:
-                held += 1
-            ratios.append((ratio, f"{name} P{order}" + (f" ({'; '.join(left_out)})" if left_out else "")))
-    ratios.sort()
-    values = [ratio for ratio, _ in ratios]
-    print(f"{len(rows)} runs, {len(ratios)} with a bound and a true error above rounding; {held} hold")
-    if values:
-        print(f"bound / truth: median {median(values):.2f}, nine tenths below {values[len(values) * 9 // 10]:.2f}")
-        print(f"recovered strains / truth: from {min(estimates):.2f} to {max(estimates):.2f}, median {median(estimates):.2f}")
-        print("least:", *(f"  {ratio:.3f} {name}" for ratio, name in ratios[:10]), sep="\n")
-        print("largest:", *(f"  {ratio:.2f} {name}" for ratio, name in ratios[-10:]), sep="\n")
+    print(f"{len(rows)} runs; those below have a bound and a true error above rounding")
+    for kind, found in ratios.items():
+        found.sort()
+        if found:
+            values = [ratio for ratio, _ in found]
+            below = sum(ratio < 1 - ROUNDING for ratio in values)
+            print(f"{kind}: {len(values)}, of which {below} below the error; bound / error: median {median(values):.2f}, "
+                  f"nine tenths below {values[len(values) * 9 // 10]:.2f}",
+                  "least:", *(f"  {ratio:.3f} {name}" for ratio, name in found[:6]),
+                  "largest:", *(f"  {ratio:.2f} {name}" for ratio, name in found[-10:]), sep="\n")
+    if estimates:
+        print(f"where proved, recovered strains / error: from {min(estimates):.2f} to {max(estimates):.2f}, "
+              f"median {median(estimates):.2f}")
     for line in wrong:
         print("WRONG", line)
     return 1 if wrong else 0
