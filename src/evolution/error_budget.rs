@@ -43,8 +43,8 @@ impl ErrorBudget {
         let proved = if self.can_be_damaged { "proved for this ζ" } else { "proved" };
         let error = match (self.displacement_bound, &reservations[..]) {
             (Some(bound @ 1.0..), "") => format!(
-                "at most {} (energy norm, {proved}): useless, the mesh is too coarse or its triangles are \
-                 too stretched",
+                "at most {} (energy norm, {proved}): useless, the mesh is too coarse, its triangles are too \
+                 stretched, or contact is in single nodes",
                 percent(bound)
             ),
             (Some(bound), "") => format!("at most {} (energy norm, {proved})", percent(bound)),
