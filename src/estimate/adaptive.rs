@@ -80,6 +80,8 @@ pub struct Measured {
     pub stop: Option<f64>,
     /// The relative error of the damage ζ₀ − ζ in L² at the end; `None` without damage.
     pub damage: Option<f64>,
+    /// The relative error of u in the energy norm at the end; 0 if the run ends at ζ_*.
+    pub displacement: f64,
 }
 
 /// Errors that prevent an adapted mesh.

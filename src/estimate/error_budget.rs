@@ -22,6 +22,7 @@ impl ErrorBudget {
         let bars = |[_, bar]: &[DVector<f64>; 2]| (bar.clone(), caused(bar.as_slice()));
         Self {
             displacement_mesh: accuracy.energy,
+            is_measured: false,
             displacement_bound: proof.as_ref().ok().map(|(bound, _)| *bound),
             reservations: proof.map_or_else(|reason| vec![reason], |(_, left_out)| left_out),
             damage_mesh: None,

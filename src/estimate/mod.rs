@@ -101,6 +101,7 @@ impl Outcome {
             return Ok(());
         }
         self.errors.damage_mesh = measured.damage;
+        self.errors.set_measured(measured.displacement);
         if unknown || measured.bars.is_empty() {
             return Ok(());
         }

@@ -8,8 +8,11 @@ use serde::Serialize;
 /// They are `None` without damage. The errors of the time steps are also `None` if there are too few steps, and at ζ_*.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ErrorBudget {
-    /// The error of u from the mesh.
+    /// The error of u from the mesh: the measured one or, without a measurement, the estimated one.
     pub displacement_mesh: f64,
+    /// Is it measured?
+    #[serde(skip)]
+    pub is_measured: bool,
     /// A proved bound on this error, for the given ζ; `None` if there is none.
     pub displacement_bound: Option<f64>,
     /// What the proof leaves out, or the reason why there is none.
@@ -36,7 +39,15 @@ pub struct ErrorBudget {
 const NEGLIGIBLE_ERROR: f64 = 1e-9;
 
 impl ErrorBudget {
-    /// The error of u from the mesh: the proved bound, or the estimate.
+    /// Sets the `measured` error of u from the mesh. An estimate that is larger stays, and so does a proved bound that is smaller.
+    pub fn set_measured(&mut self, measured: f64) {
+        let proved = self.displacement_bound.filter(|_| self.reservations.is_empty());
+        let error = self.displacement_mesh.max(measured);
+        self.displacement_mesh = proved.map_or(error, |bound| error.min(bound));
+        self.is_measured = measured > 0.0;
+    }
+
+    /// The error of u from the mesh: the proved bound, beside it the measured error, or the estimate.
     fn of_displacements(&self) -> String {
         let (estimate, reservations) =
             (percent(self.displacement_mesh), self.reservations.join(", "));
@@ -55,7 +66,11 @@ impl ErrorBudget {
             (None, "") => format!("{estimate} (energy norm)"),
             (None, reason) => format!("{estimate} (energy norm, estimated: no proof, as {reason})"),
         };
-        format!("from the mesh: u {error}")
+        let measured = match self.displacement_bound {
+            Some(_) if self.is_measured => format!("{estimate} (measured), "),
+            _ => String::new(),
+        };
+        format!("from the mesh: u {measured}{error}")
     }
 
     /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of

@@ -1,7 +1,11 @@
-//! The change of the damage between a mesh and a finer one.
+//! The changes of the damage and of u between a mesh and a finer one.
 
-use super::{sequence::Level, sizes::areas};
-use crate::mesh::Refinement;
+use super::{few_step_run::FewStepRun, sequence::Level, sizes::areas};
+use crate::{
+    fem::Triangle,
+    mesh::{Mesh, Refinement},
+};
+use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
 /// Per triangle of the mesh that was bisected to `finer`: its share in the squared change ‖ζ_h − ζ_{h/2}‖² / ‖1 − ζ_{h/2}‖² at
@@ -30,4 +34,43 @@ pub(super) fn damage(coarse: &Level, finer: &Refinement, fine: &Level) -> [Vec<f
     }
     shares.iter_mut().for_each(|share| *share = if *share > 0.0 { *share / done } else { 0.0 });
     [shares, largest]
+}
+
+/// ‖u_h − u_{h/2}‖ / ‖u_{h/2}‖ at the end in the energy norm, with u_h on the `mesh` that was bisected to `finer`. Collective.
+///
+/// On a triangle T, the difference e of the strains is affine: ∫ e eᵀ = |T|/12 (Σ e_i e_iᵀ + s sᵀ), with its values e_i at the
+/// vertices and their sum s.
+pub(super) fn displacement(
+    coarse: &FewStepRun,
+    mesh: &Mesh,
+    finer: &Refinement,
+    fine: &FewStepRun,
+) -> f64 {
+    let (before, after, size) = (coarse.strains(), fine.strains(), fine.energy());
+    let (problem, comm) = (fine.problem, fine.problem.body.nodes.partition.comm());
+    let (body, elasticity) = (&problem.body, &problem.terms.elasticity);
+    let zeta = problem.zeta_at_points(&fine.outcome.last.state.zeta);
+    let per_triangle = zeta.len() / body.triangles.len();
+    let square = |t: usize| {
+        let whole = body.global_triangles[t];
+        let parent = finer.parent_of_triangle[whole];
+        let corners = mesh.triangles[parent].map(|node| mesh.nodes[node]);
+        let gradients = *Triangle::new(corners).gradients();
+        let difference = [0, 1, 2].map(|i| {
+            let [x, y] = body.mesh.nodes[body.mesh.triangles[t][i]];
+            // The strain of the parent at this place: Σ λ_j s_j, with λ_j = 1/3 + ∇λ_j · (x − centroid).
+            let centroid = [0, 1].map(|k| corners.iter().map(|at| at[k]).sum::<f64>() / 3.0);
+            let part = |[a, b]: [f64; 2]| 1.0 / 3.0 + a * (x - centroid[0]) + b * (y - centroid[1]);
+            let strain = before[parent].iter().zip(gradients).map(|(of, g)| of * part(g));
+            after[whole][i] - strain.sum::<Vector3<f64>>()
+        });
+        let sum = difference.iter().sum::<Vector3<f64>>();
+        let products = difference.iter().chain([&sum]).map(|e| e * e.transpose());
+        let mean =
+            zeta[per_triangle * t..][..per_triangle].iter().sum::<f64>() / per_triangle as f64;
+        let products = products.sum::<Matrix3<f64>>() * (mean * body.triangles[t].area() / 12.0);
+        elasticity.d(body, t).dot(&products)
+    };
+    let square = comm.total((0..body.own_triangles).map(square).sum::<f64>());
+    if square > 0.0 { (square / size).sqrt() } else { 0.0 }
 }

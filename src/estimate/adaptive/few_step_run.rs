@@ -1,11 +1,12 @@
 //! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
 
 use crate::{
-    estimate::{Extremes, RecoveredStrains, UNLOADED},
+    estimate::{Extremes, RecoveredStrains, UNLOADED, recovery::at_vertices},
     evolution::{Choices, Outcome, Phases, RunError, Step, all_steps},
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State, Value},
 };
+use nalgebra::Vector3;
 
 /// Number of steps of the run, and of evenly spread times at which its errors are estimated.
 ///
@@ -131,6 +132,27 @@ impl<'a> FewStepRun<'a> {
         [0, 1, 2].map(|i| self.gathered(&own(i)))
     }
 
+    /// ε(u) at the end at the vertices of each triangle of the undivided mesh. Collective.
+    pub(super) fn strains(&self) -> Vec<[Vector3<f64>; 3]> {
+        let (body, state) = (&self.problem.body, &self.outcome.last.state);
+        let strains = body.strains(&self.problem.strained(state).u);
+        let own = strains.chunks(strains.len() / body.triangles.len());
+        let own = Vec::from_iter(own.map(at_vertices));
+        let mut strains = vec![[Vector3::zeros(); 3]; self.history.squares.len()];
+        for (i, component) in (0..3).flat_map(|i| (0..3).map(move |component| (i, component))) {
+            let values = Vec::from_iter(own.iter().map(|strains| strains[i][component]));
+            let values = self.gathered(&values);
+            strains.iter_mut().zip(values).for_each(|(of, value)| of[i][component] = value);
+        }
+        strains
+    }
+
+    /// ‖u‖² at the end by which its error is divided, N m per metre of thickness. After unloading, the remaining deformation need
+    /// not be exact.
+    pub(super) fn energy(&self) -> f64 {
+        self.history.end.2.max(UNLOADED.powi(2) * self.history.energy)
+    }
+
     /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
     pub(super) fn gathered(&self, own: &[f64]) -> Vec<f64> {
         gathered(self.problem, own, self.history.squares.len())
@@ -138,12 +160,11 @@ impl<'a> FewStepRun<'a> {
 
     /// The relative error of u at the worst time, and the shares m_T of its square.
     pub(super) fn relative(&self) -> (f64, Vec<f64>) {
-        let History { squares, worst, energy, end: (last, error, of_last), .. } = &self.history;
+        let History { squares, worst, energy, end: (last, error, _), .. } = &self.history;
         if *worst == 0.0 {
             return (0.0, vec![0.0; squares.len()]);
         }
-        // After unloading, the remaining deformation need not be exact.
-        let of_last = of_last.max(UNLOADED.powi(2) * energy);
+        let of_last = self.energy();
         let share = |(max, end): (&f64, &f64)| (max / energy).max(end / of_last);
         let shares = squares.iter().zip(last).map(share).collect();
         ((worst / energy).max(error / of_last).sqrt(), shares)
