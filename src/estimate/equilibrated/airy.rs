@@ -39,10 +39,13 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
         let size = of_centre + of_side * count;
         let mut gram = DMatrix::<f64>::zeros(size, size);
         let mut right = DVector::<f64>::zeros(size);
-        // The place of a function of triangle j among the unknowns of the star.
-        let place = |j: usize, function: usize| match function.checked_sub(of_centre) {
-            None => function,
-            Some(k) => of_centre + of_side * ((j + k / of_side) % count) + k % of_side,
+        // The places of the functions of triangle j among the unknowns of the star.
+        let places = |j: usize| {
+            let first = [j, if j + 1 < count { j + 1 } else { 0 }].map(|j| of_centre + of_side * j);
+            std::array::from_fn::<usize, C, _>(|c| match c.checked_sub(of_centre) {
+                None => c,
+                Some(k) => first[k / of_side] + k % of_side,
+            })
         };
         for (j, &(t, i)) in star.triangles.iter().enumerate() {
             let triangle = &triangles[t];
@@ -58,9 +61,10 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
             let error = Composite::<R, D>::ordered(i, &frame.inverse, &sides, &body);
             let gradient = local.transpose() * (form * error);
             let own = local.transpose() * (form.fixed_columns::<R>(0) * local);
-            for c in 0..C {
-                right[place(j, c)] -= gradient[c];
-                (0..C).for_each(|r| gram[(place(j, r), place(j, c))] += own[(r, c)]);
+            let places = places(j);
+            for (c, column) in places.into_iter().enumerate() {
+                right[column] -= gradient[c];
+                places.iter().enumerate().for_each(|(r, row)| gram[(*row, column)] += own[(r, c)]);
             }
         }
         let fixed_sides = (0..count).filter(|j| !is_free(*j)).flat_map(|j| {
@@ -76,7 +80,8 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
         let Some(gram) = gram.cholesky() else { continue };
         gram.solve_mut(&mut right);
         for (j, &(t, i)) in star.triangles.iter().enumerate() {
-            let own = SMatrix::<f64, C, 1>::from_fn(|c, _| right[place(j, c)]);
+            let places = places(j);
+            let own = SMatrix::<f64, C, 1>::from_fn(|c, _| right[places[c]]);
             let change = functions::<R, C>(&triangles[t], i) * own;
             let used = R / 4;
             for (k, side) in [i, (i + 2) % 3].into_iter().enumerate() {

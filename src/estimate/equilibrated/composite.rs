@@ -89,12 +89,12 @@ impl<const R: usize, const D: usize> Composite<R, D> {
     /// ∫ σ : A⁻¹ σ as a bilinear form of the forces on both sides at the vertex i and of all forces, as in [`Self::ordered`], for a
     /// [`Frame::metric`].
     pub(super) fn form(&self, i: usize, metric: &Matrix3<f64>) -> SMatrix<f64, R, D> {
+        let [a, b, c, d, e, f] = PAIRS.map(|at| metric[at]);
+        let [p, q, r, s, t, u] = self.products[i].each_ref().map(|of| &of.as_slice()[..R * D]);
         let mut form = SMatrix::<f64, R, D>::zeros();
-        for (product, at) in self.products[i].iter().zip(PAIRS) {
-            let factor = metric[at];
-            for (sum, part) in form.as_mut_slice().iter_mut().zip(product.as_slice()) {
-                *sum += factor * part;
-            }
+        // One pass over all six.
+        for (k, sum) in form.as_mut_slice()[..R * D].iter_mut().enumerate() {
+            *sum = a * p[k] + b * q[k] + c * r[k] + d * s[k] + e * t[k] + f * u[k];
         }
         form
     }

@@ -126,7 +126,7 @@ pub(crate) fn proved_error(
     if comm.total(imbalance).sqrt() > IMBALANCE * forces {
         return Ok(Err("the stiffness is ill-conditioned"));
     }
-    let mut tractions = summed(body, &parts);
+    let mut tractions = summed(body, parts);
     for (sides, triangle) in tractions.iter_mut().zip(&triangles) {
         (0..3).for_each(|s| sides[s][2] = triangle.bubble(s, (s + 1) % 3));
     }
@@ -153,16 +153,19 @@ pub(crate) fn proved_error(
     let mut before = f64::INFINITY;
     for sweep in 1.. {
         let mut improve = |is_wanted: &dyn Fn(&Star) -> bool, part: f64| {
-            let mut better = tractions.clone();
+            let before = (!comm.is_serial()).then(|| tractions.clone());
+            let (linear, quadratic) = (&composite::LINEAR, &composite::QUADRATIC);
             match body.order() {
                 Order::Linear => {
-                    airy::improve::<8, 18, 5>(&composite::LINEAR, known, is_wanted, &mut better)
+                    airy::improve::<8, 18, 5>(linear, known, is_wanted, &mut tractions)
                 }
                 Order::Quadratic => {
-                    airy::improve::<12, 24, 9>(&composite::QUADRATIC, known, is_wanted, &mut better)
+                    airy::improve::<12, 24, 9>(quadratic, known, is_wanted, &mut tractions)
                 }
             }
-            tractions = joined(body, std::mem::take(&mut tractions), better, part);
+            if let Some(before) = before {
+                tractions = joined(body, &before, &tractions, part);
+            }
         };
         // Stars in the subdomain of a rank share no triangle with those of other ranks. At an interface up to three
         // do: the mean of three improvements is one.
@@ -298,10 +301,10 @@ fn boundary(
 }
 
 /// The sum of the parts of the forces that all ranks have. Collective.
-fn summed(body: &Body, parts: &[SideForces]) -> Vec<SideForces> {
+fn summed(body: &Body, parts: Vec<SideForces>) -> Vec<SideForces> {
     let comm = body.nodes.partition.comm();
     if comm.is_serial() {
-        return parts.to_vec();
+        return parts;
     }
     let last = body.global_triangles.iter().copied().max().unwrap_or(0);
     let mut all = vec![[0.0; 18]; comm.max(last as f64) as usize + 1];
@@ -320,20 +323,12 @@ fn summed(body: &Body, parts: &[SideForces]) -> Vec<SideForces> {
 }
 
 /// Tractions with a part of the changes that the ranks have made to those of their stars. Collective.
-fn joined(
-    body: &Body,
-    before: Vec<SideForces>,
-    after: Vec<SideForces>,
-    part: f64,
-) -> Vec<SideForces> {
-    if body.nodes.partition.comm().is_serial() {
-        return after;
-    }
+fn joined(body: &Body, before: &[SideForces], after: &[SideForces], part: f64) -> Vec<SideForces> {
     let of = |(a, b): (&SideForces, &SideForces), factor: f64| {
         std::array::from_fn(|s| std::array::from_fn(|k| a[s][k] + factor * b[s][k]))
     };
-    let changes = Vec::from_iter(after.iter().zip(&before).map(|pair| of(pair, -1.0)));
-    before.iter().zip(&summed(body, &changes)).map(|pair| of(pair, part)).collect()
+    let changes = Vec::from_iter(after.iter().zip(before).map(|pair| of(pair, -1.0)));
+    before.iter().zip(&summed(body, changes)).map(|pair| of(pair, part)).collect()
 }
 
 /// What the proof leaves out: functions of the scene that are no polynomials of the degrees that it takes, along the sides of
