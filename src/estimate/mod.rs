@@ -26,6 +26,7 @@ pub use adaptive::{
     AdaptError, Adapted, INSTANTS, Measured, adapted, first_mesh, kinks, measured_errors,
 };
 
+pub use equilibrated::{EquilibratedStress, Unproved};
 pub use extremes::{Extreme, Extremes, KINKS_OF_TABLE};
 pub use recovery::{EnergyError, RecoveredStrains};
 pub use simulation::Simulation;

@@ -4,14 +4,16 @@
 //! `validation/bounds.py` has many more scenes.
 
 use crate::support::{ORDERS, distorted, layered, problem, square, unstructured};
+use nalgebra::{DMatrix, DVector, Vector3};
 use signorini::{
-    estimate::Simulation,
+    estimate::{EquilibratedStress, Simulation},
     evolution::{Choices, ContactStep, Phases, State},
     fem::{Body, Location},
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
     problem::DiscreteProblem,
 };
+use std::collections::HashMap;
 
 /// ‖v‖² of nodal v.
 fn square_norm(problem: &DiscreteProblem, zeta: &[f64], v: &[f64]) -> f64 {
@@ -220,5 +222,149 @@ fn what_the_proof_leaves_out_is_named() {
             let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
             assert_eq!(outcome.errors.reservations, named, "{force}, {gap}");
         }
+    }
+}
+
+/// A polynomial of degree k in x and y for each component of a stress.
+struct Polynomial {
+    degree: usize,
+    coefficients: DMatrix<f64>,
+}
+
+impl Polynomial {
+    fn monomials(degree: usize, [x, y]: [f64; 2]) -> Vec<f64> {
+        let all = [1.0, x, y, x * x, x * y, y * y];
+        all[..if degree == 1 { 3 } else { 6 }].to_vec()
+    }
+
+    /// The polynomial with these values at seven points of a part of a triangle.
+    fn through(degree: usize, points: &[([f64; 2], Vector3<f64>); 7]) -> Self {
+        let rows =
+            points.iter().map(|(at, _)| DVector::from(Self::monomials(degree, *at)).transpose());
+        let rows = DMatrix::from_rows(&Vec::from_iter(rows));
+        let values = points.map(|(_, stress)| stress.transpose());
+        let values = DMatrix::from_fn(7, 3, |i, j| values[i][j]);
+        let coefficients = rows.clone().pseudo_inverse(1e-13).unwrap() * &values;
+        assert!((rows * &coefficients - &values).amax() < 1e-8 * values.amax().max(1.0));
+        Self { degree, coefficients }
+    }
+
+    /// The traction τn at a place.
+    fn traction(&self, at: [f64; 2], [n, m]: [f64; 2]) -> [f64; 2] {
+        let values =
+            DVector::from(Self::monomials(self.degree, at)).transpose() * &self.coefficients;
+        [values[0] * n + values[2] * m, values[2] * n + values[1] * m]
+    }
+
+    /// div τ at a place.
+    fn divergence(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let slope = |derivatives: [f64; 6], component: usize| {
+            let column = self.coefficients.column(component);
+            column.iter().zip(derivatives).map(|(c, d)| c * d).sum::<f64>()
+        };
+        let [by_x, by_y] = [[0.0, 1.0, 0.0, 2.0 * x, y, 0.0], [0.0, 0.0, 1.0, 0.0, x, 2.0 * y]];
+        [slope(by_x, 0) + slope(by_y, 2), slope(by_x, 2) + slope(by_y, 1)]
+    }
+}
+
+#[test]
+fn the_stress_balances_the_loads_in_each_triangle_and_across_all_sides() {
+    // −div τ = f_B in each part of each triangle, τn is continuous, on Γ_N it is the load, and on Γ_C −pν with p ≥ 0. τ is
+    // symmetric, because it has three components.
+    let text = "material = { young = 100, poisson = 0.3, plane = 'stress', upper.young = 1000 }
+         body = { force = [0.5, -2] }
+         boundary = [
+            { name = 'left', displacement = [0, 0] },
+            { name = 'bottom', gap = '0.002*x' },
+            { name = 'right', traction = ['y', -1] },
+            { name = 'top', traction = [0, 0] },
+         ]
+         [damage]
+         diffusion = 1e-9
+         lambda_d = 0
+         lambda_u = 0
+         lambda_w = 0
+         strain_cap = 1
+         initial = '0.3 + 0.7*x'
+         [time]
+         end = 1e-6
+         step = 1e-6";
+    for degree in 1..=2 {
+        let text = format!("discretisation.displacement = {degree}\n{text}");
+        let problem = problem(layered(distorted(6)), &text).unwrap();
+        let session = Session::start(&[]).unwrap();
+        let state = Simulation::new(&problem).run(&session).unwrap().last.state;
+        let (choices, phases) = (Choices::of(problem.scene()), Phases::default());
+        let mut step = ContactStep::new(&session, &problem, &choices, &phases).unwrap();
+        let state = step.solve(0, state.time, &state.zeta).unwrap().state;
+        let mut stress = EquilibratedStress::new(&mut step, &state).unwrap().unwrap();
+        stress.improve();
+        let mesh = &problem.body.mesh;
+        let near = |a: [f64; 2], b: [f64; 2], what: &str| {
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-7, "P{degree}, {what}: {a:?}, {b:?}");
+        };
+        // Tractions at three places of each side, with the normal for the nodes in increasing order.
+        let mut sides = HashMap::<[usize; 2], Vec<[[f64; 2]; 3]>>::new();
+        let normal = |[a, b]: [[f64; 2]; 2]| {
+            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+            [(b[1] - a[1]) / length, (a[0] - b[0]) / length]
+        };
+        let along = |[a, b]: [[f64; 2]; 2], s: f64| [0, 1].map(|k| a[k] + s * (b[k] - a[k]));
+        let places = [0.0, 0.5, 1.0];
+        for (t, triangle) in mesh.triangles.iter().enumerate() {
+            let parts = stress.stresses(t).map(|points| Polynomial::through(degree, &points));
+            let corners = triangle.map(|node| mesh.nodes[node]);
+            let centroid = [0, 1].map(|k| corners.iter().map(|x| x[k]).sum::<f64>() / 3.0);
+            for (s, part) in parts.iter().enumerate() {
+                let ends = [corners[s], corners[(s + 1) % 3]];
+                for at in [ends[0], ends[1], centroid] {
+                    near(part.divergence(at), [-0.5, 2.0], "div τ");
+                }
+                let (spoke, before) = ([ends[0], centroid], &parts[(s + 2) % 3]);
+                for place in places {
+                    let (at, n) = (along(spoke, place), normal(spoke));
+                    near(part.traction(at, n), before.traction(at, n), "between parts");
+                }
+                let mut nodes = [triangle[s], triangle[(s + 1) % 3]];
+                nodes.sort();
+                let ends = nodes.map(|node| mesh.nodes[node]);
+                let traction = |place| part.traction(along(ends, place), normal(ends));
+                sides.entry(nodes).or_default().push(places.map(traction));
+            }
+        }
+        for tractions in sides.values().filter(|of| of.len() == 2) {
+            (0..3).for_each(|k| near(tractions[0][k], tractions[1][k], "between triangles"));
+        }
+        // Outward tractions of the boundary: that of a side whose nodes increase with the body on its left.
+        let outward = |edge: &[usize; 2]| {
+            let mut nodes = *edge;
+            nodes.sort();
+            let ends = nodes.map(|node| mesh.nodes[node]);
+            let n = normal(ends);
+            let [x, y] = along(ends, 0.5);
+            let sign = if (x - 0.5) * n[0] + (y - 0.5) * n[1] > 0.0 { 1.0 } else { -1.0 };
+            (ends, sides[&nodes][0].map(|t| t.map(|component| sign * component)))
+        };
+        for edge in mesh.edges_of("right") {
+            let (ends, tractions) = outward(edge);
+            places
+                .iter()
+                .zip(tractions)
+                .for_each(|(place, t)| near(t, [along(ends, *place)[1], -1.0], "load"));
+        }
+        let mut force = 0.0;
+        for (ends, [a, c, b]) in stress.pressures() {
+            assert!(a >= 0.0 && b >= 0.0 && c >= 0.0, "{a}, {c}, {b}");
+            let edges = mesh.edges_of("bottom").iter().map(outward);
+            let known = |(of, _): &([[f64; 2]; 2], _)| *of == ends || [of[1], of[0]] == ends;
+            let (of, tractions) = edges.clone().find(known).unwrap();
+            let p = |s: f64| a * (1.0 - s).powi(2) + 2.0 * c * s * (1.0 - s) + b * s * s;
+            for (place, traction) in places.into_iter().zip(tractions) {
+                let s = if of == ends { place } else { 1.0 - place };
+                near(traction, [0.0, p(s)], "pressure");
+            }
+            force += (a + c + b) / 3.0 * (ends[0][0] - ends[1][0]).abs();
+        }
+        assert!(force > 0.1, "the body presses on its foundation: {force}");
     }
 }

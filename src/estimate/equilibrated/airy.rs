@@ -35,6 +35,8 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
             let edge = || boundary.get(&sorted([star.node, star.end(triangles, j)]));
             !is_boundary || edge().is_some_and(|edge| edge.known().is_empty())
         };
+        // The length of which φ is a multiple: any, but the same one in all triangles of the star.
+        let length = star.triangles.first().map_or(1.0, |&(t, _)| triangles[t].area.sqrt());
         let has_centre = star.is_closed || (is_free(0) && is_free(count - 1));
         let size = of_centre + of_side * count;
         let mut gram = DMatrix::<f64>::zeros(size, size);
@@ -50,7 +52,7 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
         for (j, &(t, i)) in star.triangles.iter().enumerate() {
             let triangle = &triangles[t];
             let frame = Frame::new(triangle.corners);
-            let functions = functions::<R, C>(triangle, i);
+            let functions = functions::<R, C>(triangle, i, length);
             let mut local = functions;
             for k in 0..R / 2 {
                 let turned = frame.inverse * functions.fixed_rows::<2>(2 * k);
@@ -82,7 +84,7 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
         for (j, &(t, i)) in star.triangles.iter().enumerate() {
             let places = places(j);
             let own = SMatrix::<f64, C, 1>::from_fn(|c, _| right[places[c]]);
-            let change = functions::<R, C>(&triangles[t], i) * own;
+            let change = functions::<R, C>(&triangles[t], i, length) * own;
             let used = R / 4;
             for (k, side) in [i, (i + 2) % 3].into_iter().enumerate() {
                 for (m, force) in forces[t][side][..used].iter_mut().enumerate() {
@@ -93,13 +95,14 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
     }
 }
 
-/// The forces on the first and the last side of the vertex i by each function: φ and G of the vertex, then per side its normal
-/// derivative and bubbles.
+/// The forces on the first and the last side of the vertex i by each function: φ/`length` and G of the vertex, then per side its
+/// normal derivative and bubbles.
 fn functions<const R: usize, const C: usize>(
     triangle: &StressedTriangle,
     i: usize,
+    length: f64,
 ) -> SMatrix<f64, R, C> {
-    let (mut functions, size) = (SMatrix::<f64, R, C>::zeros(), triangle.area.sqrt());
+    let mut functions = SMatrix::<f64, R, C>::zeros();
     let (used, of_side) = (R / 4, (C - 3) / 2);
     for last in 0..2 {
         let spoke = triangle.corners[(i + 1 + last) % 3] - triangle.corners[i];
@@ -110,7 +113,7 @@ fn functions<const R: usize, const C: usize>(
             functions.fixed_view_mut::<2, 1>(row, function).copy_from(&(sign * force));
         };
         // The mean of ∇φ along the side is −φ/h.
-        let mean = -size / spoke.norm_squared() * Vector2::new(spoke.y, -spoke.x);
+        let mean = -length / spoke.norm_squared() * Vector2::new(spoke.y, -spoke.x);
         set(0, at_centre, mean);
         set(0, at_end, -mean);
         set(1, at_centre, -Vector2::x());

@@ -124,14 +124,25 @@ impl<const R: usize, const D: usize> Composite<R, D> {
         forces
     }
 
-    /// ∫ (ζA)⁻¹(τ − ζAε) : (τ − ζAε), N m per metre of thickness. Between the corners of the parts 1/ζ is replaced by its interpolation,
-    /// which is never smaller.
-    pub(super) fn square(&self, on: &LoadedTriangle) -> f64 {
+    /// τ̂ at the points.
+    fn on_reference(&self, on: &LoadedTriangle) -> SVector<f64, VALUES> {
         let used = D / 6 - 1;
         let forces = on.sides.iter().flat_map(|side| &side[..used]).chain(&on.body);
         let forces = forces.flat_map(|force| <[f64; 2]>::from(on.frame.inverse * force));
-        let forces = SVector::<f64, D>::from_iterator(forces);
-        let mut errors = self.stresses * forces;
+        self.stresses * SVector::<f64, D>::from_iterator(forces)
+    }
+
+    /// τ, Pa, at the points with their barycentric coordinates.
+    pub(super) fn stresses(&self, on: &LoadedTriangle) -> [([f64; 3], Vector3<f64>); RULE_SIZE] {
+        let stresses = self.on_reference(on);
+        let stress = |q: usize| on.frame.to_physical * stresses.fixed_rows::<3>(3 * q);
+        std::array::from_fn(|q| (self.points[q].0, stress(q)))
+    }
+
+    /// ∫ (ζA)⁻¹(τ − ζAε) : (τ − ζAε), N m per metre of thickness. Between the corners of the parts 1/ζ is replaced by its interpolation,
+    /// which is never smaller.
+    pub(super) fn square(&self, on: &LoadedTriangle) -> f64 {
+        let mut errors = self.on_reference(on);
         let Some((to_reference, compliance)) =
             on.frame.to_physical.try_inverse().zip(on.d.try_inverse())
         else {

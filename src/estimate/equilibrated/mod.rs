@@ -72,99 +72,138 @@ pub(crate) fn proved_error(
     state: &State,
     estimate: f64,
 ) -> Result<Result<ProvedError, Unproved>, PetscError> {
-    let problem = contact_step.problem();
-    let (body, terms) = (&problem.body, &problem.terms);
-    let (partition, points) = (&body.nodes.partition, problem.zeta_at_points(&state.zeta));
-    let comm = partition.comm();
-    let energy = |u: &[f64]| comm.total(terms.energy(body, &points, u));
-    let size = energy(&problem.strained(state).u);
-    if comm.any(is_curved(body)) {
-        return Ok(Err("sides are curved"));
-    }
-    if size <= 0.0 {
-        return Ok(Err("nothing is deformed"));
-    }
-    // The pressure, and an admissible u_h.
-    let vertices = body.node_of_vertex();
-    let corners =
-        Vec::from_iter(body.mesh.triangles.iter().map(|t| t.map(|vertex| vertices[vertex])));
-    let stars = Star::all(&corners, partition.owned());
-    if comm.any(stars.is_none()) {
-        return Ok(Err("parts of the body touch in a point"));
-    }
-    let stars = stars.unwrap_or_default();
-    let sides = sides(body, &stars);
-    let mut foundations = Foundation::all(problem, state, &sides);
-    let load = problem.load(state.time);
-    if !pressure::balance(problem, &mut foundations, &load) {
-        return Ok(Err("no contact pressure on whole edges was found that balances the loads"));
-    }
-    let edges = foundations.into_iter().flat_map(|foundation| foundation.edges);
-    let mut edges = Vec::from_iter(edges);
-    let mut moved = vec![0.0; state.u.len()];
-    edges.iter_mut().for_each(|edge| edge.admit(&mut moved));
-    partition.update(&mut moved, 2)?;
-    let admitted: Vec<f64> = state.u.iter().zip(&moved).map(|(u, v)| u + v).collect();
-    // The correction w.
-    let contact = pressure::nodal_forces(problem, &edges);
-    let internal = terms.internal_force(body, &points, &state.u);
-    let rest = load.iter().zip(&contact).zip(&internal).map(|((f, p), k)| f + p - k).collect();
-    let held = contact_step.holding();
-    let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
-    let (_, w) = contact_step.corrected(&points, rest, &held, |_| CORRECTION * forces)?;
-    let corrected: Vec<f64> = state.u.iter().zip(&w).map(|(u, w)| u + w).collect();
-    // The tractions.
-    let zeta = Vec::from_iter(state.zeta.iter().map(|zeta| problem.truncated(*zeta)));
-    let loads = problem.loads.by_elements(body, state.time);
-    let triangles = stressed(problem, [&points, &zeta], &corrected, &loads);
-    let boundary = boundary(problem, &edges, &sides, &loads);
-    let found = stars::tractions(&triangles, &stars, &boundary);
-    if comm.any(found.is_none()) {
-        return Ok(Err("a part of the boundary is not known"));
-    }
-    let (parts, imbalance) = found.unwrap_or_default();
-    if comm.total(imbalance).sqrt() > IMBALANCE * forces {
-        return Ok(Err("the stiffness is ill-conditioned"));
-    }
-    let mut tractions = summed(body, parts);
-    for (sides, triangle) in tractions.iter_mut().zip(&triangles) {
-        (0..3).for_each(|s| sides[s][2] = triangle.bubble(s, (s + 1) % 3));
-    }
-    // The stresses, with better tractions as long as these pay.
-    let strains = body.strains(&admitted);
-    let per_triangle = strains.len() / body.triangles.len();
-    let square = |tractions: &[SideForces], t: usize| {
-        let triangle = LoadedTriangle {
-            frame: Frame::new(triangles[t].corners),
-            d: terms.elasticity.d(body, t),
-            strains: at_vertices(&strains[per_triangle * t..per_triangle * (t + 1)]),
-            zeta: body.mesh.triangles[t].map(|vertex| zeta[vertex]),
-            sides: &tractions[t],
-            body: triangles[t].body,
-        };
-        match body.order() {
-            Order::Linear => composite::LINEAR.square(&triangle),
-            Order::Quadratic => composite::QUADRATIC.square(&triangle),
-        }
+    let mut stress = match EquilibratedStress::new(contact_step, state)? {
+        Ok(stress) => stress,
+        Err(reason) => return Ok(Err(reason)),
     };
-    let contact = comm.total(2.0 * edges.iter().map(ContactEdge::work).sum::<f64>());
-    let of_moved = energy(&moved).max(0.0).sqrt();
-    let known = (&triangles[..], &stars[..], &boundary);
     let mut before = f64::INFINITY;
     for sweep in 1.. {
+        stress.improve();
+        let square = stress.square();
+        let relative = stress.bound(square);
+        if relative <= ENOUGH * estimate || square > FALLS * before || sweep == MOST_SWEEPS {
+            let left_out = left_out(stress.problem, &stress.edges, state.time);
+            return Ok(Ok(ProvedError { relative, left_out }));
+        }
+        before = square;
+    }
+    unreachable!("the last sweep returns")
+}
+
+/// A stress τ in equilibrium with the loads, near that of a computed state, and its pressure p ≥ 0 on Γ_C.
+pub struct EquilibratedStress<'a> {
+    problem: &'a DiscreteProblem,
+    triangles: Vec<StressedTriangle>,
+    stars: Vec<Star>,
+    boundary: HashMap<[usize; 2], BoundaryEdge>,
+    edges: Vec<ContactEdge>,
+    tractions: Vec<SideForces>,
+    /// ζ at the vertices, and the strains of an admissible u_h at the quadrature points.
+    zeta: Vec<f64>,
+    strains: Vec<Vector3<f64>>,
+    /// The energy norms of the computed u, and of what makes it admissible.
+    norm: f64,
+    of_moved: f64,
+}
+
+impl<'a> EquilibratedStress<'a> {
+    /// The stress for a state of the problem of `contact_step`, which solves for the correction; or why there is none. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub fn new(
+        contact_step: &mut ContactStep<'a>,
+        state: &State,
+    ) -> Result<Result<Self, Unproved>, PetscError> {
+        let problem = contact_step.problem();
+        let (body, terms) = (&problem.body, &problem.terms);
+        let (partition, points) = (&body.nodes.partition, problem.zeta_at_points(&state.zeta));
+        let comm = partition.comm();
+        let norm = |u: &[f64]| comm.total(terms.energy(body, &points, u)).max(0.0).sqrt();
+        let size = norm(&problem.strained(state).u);
+        if comm.any(is_curved(body)) {
+            return Ok(Err("sides are curved"));
+        }
+        if size <= 0.0 {
+            return Ok(Err("nothing is deformed"));
+        }
+        // The pressure, and an admissible u_h.
+        let vertices = body.node_of_vertex();
+        let corners =
+            Vec::from_iter(body.mesh.triangles.iter().map(|t| t.map(|vertex| vertices[vertex])));
+        let stars = Star::all(&corners, partition.owned());
+        if comm.any(stars.is_none()) {
+            return Ok(Err("parts of the body touch in a point"));
+        }
+        let stars = stars.unwrap_or_default();
+        let sides = sides(body, &stars);
+        let mut foundations = Foundation::all(problem, state, &sides);
+        let load = problem.load(state.time);
+        if !pressure::balance(problem, &mut foundations, &load) {
+            return Ok(Err("no contact pressure on whole edges was found that balances the loads"));
+        }
+        let edges = foundations.into_iter().flat_map(|foundation| foundation.edges);
+        let mut edges = Vec::from_iter(edges);
+        let mut moved = vec![0.0; state.u.len()];
+        edges.iter_mut().for_each(|edge| edge.admit(&mut moved));
+        partition.update(&mut moved, 2)?;
+        let admitted: Vec<f64> = state.u.iter().zip(&moved).map(|(u, v)| u + v).collect();
+        // The correction w.
+        let contact = pressure::nodal_forces(problem, &edges);
+        let internal = terms.internal_force(body, &points, &state.u);
+        let rest = load.iter().zip(&contact).zip(&internal).map(|((f, p), k)| f + p - k).collect();
+        let held = contact_step.holding();
+        let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
+        let (_, w) = contact_step.corrected(&points, rest, &held, |_| CORRECTION * forces)?;
+        let corrected: Vec<f64> = state.u.iter().zip(&w).map(|(u, w)| u + w).collect();
+        // The tractions.
+        let zeta = Vec::from_iter(state.zeta.iter().map(|zeta| problem.truncated(*zeta)));
+        let loads = problem.loads.by_elements(body, state.time);
+        let triangles = stressed(problem, [&points, &zeta], &corrected, &loads);
+        let boundary = boundary(problem, &edges, &sides, &loads);
+        let found = stars::tractions(&triangles, &stars, &boundary);
+        if comm.any(found.is_none()) {
+            return Ok(Err("a part of the boundary is not known"));
+        }
+        let (parts, imbalance) = found.unwrap_or_default();
+        if comm.total(imbalance).sqrt() > IMBALANCE * forces {
+            return Ok(Err("the stiffness is ill-conditioned"));
+        }
+        let mut tractions = summed(body, parts);
+        for (sides, triangle) in tractions.iter_mut().zip(&triangles) {
+            (0..3).for_each(|s| sides[s][2] = triangle.bubble(s, (s + 1) % 3));
+        }
+        let (strains, of_moved) = (body.strains(&admitted), norm(&moved));
+        Ok(Ok(Self {
+            problem,
+            triangles,
+            stars,
+            boundary,
+            edges,
+            tractions,
+            zeta,
+            strains,
+            norm: size,
+            of_moved,
+        }))
+    }
+
+    /// Improves the tractions star by star. Collective.
+    pub fn improve(&mut self) {
+        let Self { triangles, stars, boundary, tractions, .. } = self;
+        let body = &self.problem.body;
+        let (comm, known) = (body.nodes.partition.comm(), (&triangles[..], &stars[..], &*boundary));
         let mut improve = |is_wanted: &dyn Fn(&Star) -> bool, part: f64| {
             let before = (!comm.is_serial()).then(|| tractions.clone());
             let (linear, quadratic) = (&composite::LINEAR, &composite::QUADRATIC);
             match body.order() {
-                Order::Linear => {
-                    airy::improve::<8, 18, 5>(linear, known, is_wanted, &mut tractions)
-                }
+                Order::Linear => airy::improve::<8, 18, 5>(linear, known, is_wanted, tractions),
                 Order::Quadratic => {
-                    airy::improve::<12, 24, 9>(quadratic, known, is_wanted, &mut tractions)
+                    airy::improve::<12, 24, 9>(quadratic, known, is_wanted, tractions)
                 }
             }
             if let Some(before) = before {
-                tractions = joined(body, &before, &tractions, part);
+                *tractions = joined(body, &before, tractions, part);
             }
         };
         // Stars in the subdomain of a rank share no triangle with those of other ranks. At an interface up to three
@@ -174,18 +213,60 @@ pub(crate) fn proved_error(
         if !comm.is_serial() {
             (0..INTERFACE_SWEEPS).for_each(|_| improve(&|star| !is_inside(star), 1.0 / 3.0));
         }
-        let own: f64 = (0..body.own_triangles).map(|t| square(&tractions, t)).sum();
-        let all = comm.total(own);
-        let relative = ((all + contact).sqrt() + of_moved) / size.sqrt();
-        if relative <= ENOUGH * estimate || all > FALLS * before || sweep == MOST_SWEEPS {
-            return Ok(Ok(ProvedError {
-                relative,
-                left_out: left_out(problem, &edges, state.time),
-            }));
-        }
-        before = all;
     }
-    unreachable!("the last sweep returns")
+
+    /// ∫ (ζA)⁻¹(τ − ζAε(u_h)) : (τ − ζAε(u_h)), N m per metre of thickness, with an admissible u_h. Collective.
+    fn square(&self) -> f64 {
+        let body = &self.problem.body;
+        let square = |t: usize| {
+            let triangle = self.loaded(t);
+            match body.order() {
+                Order::Linear => composite::LINEAR.square(&triangle),
+                Order::Quadratic => composite::QUADRATIC.square(&triangle),
+            }
+        };
+        body.nodes.partition.comm().total((0..body.own_triangles).map(square).sum())
+    }
+
+    /// The bound on ‖u − u_h‖ / ‖u_h‖ for the `square` of τ. Collective.
+    fn bound(&self, square: f64) -> f64 {
+        let contact = 2.0 * self.edges.iter().map(ContactEdge::work).sum::<f64>();
+        let contact = self.problem.body.nodes.partition.comm().total(contact);
+        ((square + contact).sqrt() + self.of_moved) / self.norm
+    }
+
+    /// (τ_xx, τ_yy, τ_xy) in triangle `t`, Pa, at seven points, m, of each of the three parts between a side and the centroid. They
+    /// determine τ, which is a polynomial in each part, of the degree of the displacements.
+    pub fn stresses(&self, t: usize) -> [[([f64; 2], Vector3<f64>); 7]; 3] {
+        let triangle = self.loaded(t);
+        let stresses = match self.problem.body.order() {
+            Order::Linear => composite::LINEAR.stresses(&triangle),
+            Order::Quadratic => composite::QUADRATIC.stresses(&triangle),
+        };
+        let corners = self.triangles[t].corners;
+        let place = |at: [f64; 3]| corners.iter().zip(at).map(|(x, l)| x * l).sum::<Vector2<f64>>();
+        let at = |q: usize| (<[f64; 2]>::from(place(stresses[q].0)), stresses[q].1);
+        [0, 1, 2].map(|part| std::array::from_fn(|q| at(7 * part + q)))
+    }
+
+    /// The edges of Γ_C: the places of their ends, m, and p = p_a (1 − s)² + 2c s (1 − s) + p_b s² as (p_a, c, p_b), Pa.
+    pub fn pressures(&self) -> impl Iterator<Item = ([[f64; 2]; 2], [f64; 3])> {
+        self.edges.iter().map(|edge| (edge.ends(), edge.coefficients()))
+    }
+
+    /// Triangle `t` with what acts on it.
+    fn loaded(&self, t: usize) -> LoadedTriangle<'_> {
+        let (problem, triangle) = (self.problem, &self.triangles[t]);
+        let per_triangle = self.strains.len() / self.triangles.len();
+        LoadedTriangle {
+            frame: Frame::new(triangle.corners),
+            d: problem.terms.elasticity.d(&problem.body, t),
+            strains: at_vertices(&self.strains[per_triangle * t..per_triangle * (t + 1)]),
+            zeta: problem.body.mesh.triangles[t].map(|vertex| self.zeta[vertex]),
+            sides: &self.tractions[t],
+            body: triangle.body,
+        }
+    }
 }
 
 /// Does a side of a triangle differ from its chord?

@@ -244,10 +244,20 @@ impl ContactEdge {
         if start < end { ([start, end], [a, b]) } else { ([end, start], [b, a]) }
     }
 
+    /// The places of its ends, m.
+    pub(super) fn ends(&self) -> [[f64; 2]; 2] {
+        [self.places[0], self.places[2]]
+    }
+
+    /// The coefficients of p, Pa.
+    pub(super) fn coefficients(&self) -> [f64; 3] {
+        let [p, q, r] = self.pressures;
+        [p, if self.nodes[1].is_some() { q } else { 0.5 * (p + r) }, r]
+    }
+
     /// ∫ p (g − u·ν), N m per metre of thickness.
     pub(super) fn work(&self) -> f64 {
-        let [p, q, r] = self.pressures;
-        let pressures = [p, if self.nodes[1].is_some() { q } else { 0.5 * (p + r) }, r];
+        let pressures = self.coefficients();
         let of_row = |(row, p): (&[f64; 3], f64)| {
             p * row.iter().zip(self.gaps).map(|(part, g)| part * g).sum::<f64>()
         };
