@@ -267,17 +267,77 @@ impl Polynomial {
     }
 }
 
+/// A place between two.
+fn along([a, b]: [[f64; 2]; 2], s: f64) -> [f64; 2] {
+    [0, 1].map(|k| a[k] + s * (b[k] - a[k]))
+}
+
+/// The unit normal to the right of the way from one place to another.
+fn normal([a, b]: [[f64; 2]; 2]) -> [f64; 2] {
+    let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+    [(b[1] - a[1]) / length, (a[0] - b[0]) / length]
+}
+
+fn near(a: [f64; 2], b: [f64; 2], what: &str) {
+    assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-7, "{what}: {a:?}, {b:?}");
+}
+
+/// Where tractions of a side are compared.
+const PLACES: [f64; 3] = [0.0, 0.5, 1.0];
+
+/// Checks −div τ = `force` in each part of each triangle, and that τn is continuous between them. Returns the tractions at the
+/// places of each side, with the normal to the right for its nodes in increasing order, and the pressures.
+#[allow(clippy::type_complexity)]
+fn balanced(
+    mesh: Mesh,
+    text: &str,
+    force: [f64; 2],
+) -> (HashMap<[usize; 2], [[f64; 2]; 3]>, Vec<([[f64; 2]; 2], [f64; 3])>) {
+    let problem = problem(mesh, text).unwrap_or_else(|e| panic!("{e}"));
+    let degree = problem.scene().order as usize + 1;
+    let session = Session::start(&[]).unwrap();
+    let state = Simulation::new(&problem).run(&session).unwrap().last.state;
+    let (choices, phases) = (Choices::of(problem.scene()), Phases::default());
+    let mut step = ContactStep::new(&session, &problem, &choices, &phases).unwrap();
+    let state = step.solve(0, state.time, &state.zeta).unwrap().state;
+    let mut stress = EquilibratedStress::new(&mut step, &state).unwrap().unwrap();
+    stress.improve();
+    let mesh = &problem.body.mesh;
+    let mut sides = HashMap::<[usize; 2], [[f64; 2]; 3]>::new();
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        let parts = stress.stresses(t).map(|points| Polynomial::through(degree, &points));
+        let corners = triangle.map(|node| mesh.nodes[node]);
+        let centroid = [0, 1].map(|k| corners.iter().map(|x| x[k]).sum::<f64>() / 3.0);
+        for (s, part) in parts.iter().enumerate() {
+            for at in [corners[s], corners[(s + 1) % 3], centroid] {
+                near(part.divergence(at), force.map(|f| -f), "div τ");
+            }
+            let (spoke, before) = ([corners[s], centroid], &parts[(s + 2) % 3]);
+            for place in PLACES {
+                let (at, n) = (along(spoke, place), normal(spoke));
+                near(part.traction(at, n), before.traction(at, n), "between parts");
+            }
+            let mut nodes = [triangle[s], triangle[(s + 1) % 3]];
+            nodes.sort();
+            let ends = nodes.map(|node| mesh.nodes[node]);
+            let tractions = PLACES.map(|place| part.traction(along(ends, place), normal(ends)));
+            if let Some(others) = sides.insert(nodes, tractions) {
+                (0..3).for_each(|k| near(tractions[k], others[k], "between triangles"));
+            }
+        }
+    }
+    (sides, stress.pressures().collect())
+}
+
 #[test]
 fn the_stress_balances_the_loads_in_each_triangle_and_across_all_sides() {
-    // −div τ = f_B in each part of each triangle, τn is continuous, on Γ_N it is the load, and on Γ_C −pν with p ≥ 0. τ is
-    // symmetric, because it has three components.
+    // On Γ_N τn is the load, and on Γ_C −pν with p ≥ 0. τ is symmetric, because it has three components.
     let text = "material = { young = 100, poisson = 0.3, plane = 'stress', upper.young = 1000 }
          body = { force = [0.5, -2] }
          boundary = [
             { name = 'left', displacement = [0, 0] },
             { name = 'bottom', gap = '0.002*x' },
             { name = 'right', traction = ['y', -1] },
-            { name = 'top', traction = [0, 0] },
          ]
          [damage]
          diffusion = 1e-9
@@ -290,81 +350,60 @@ fn the_stress_balances_the_loads_in_each_triangle_and_across_all_sides() {
          end = 1e-6
          step = 1e-6";
     for degree in 1..=2 {
-        let text = format!("discretisation.displacement = {degree}\n{text}");
-        let problem = problem(layered(distorted(6)), &text).unwrap();
-        let session = Session::start(&[]).unwrap();
-        let state = Simulation::new(&problem).run(&session).unwrap().last.state;
-        let (choices, phases) = (Choices::of(problem.scene()), Phases::default());
-        let mut step = ContactStep::new(&session, &problem, &choices, &phases).unwrap();
-        let state = step.solve(0, state.time, &state.zeta).unwrap().state;
-        let mut stress = EquilibratedStress::new(&mut step, &state).unwrap().unwrap();
-        stress.improve();
-        let mesh = &problem.body.mesh;
-        let near = |a: [f64; 2], b: [f64; 2], what: &str| {
-            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-7, "P{degree}, {what}: {a:?}, {b:?}");
-        };
-        // Tractions at three places of each side, with the normal for the nodes in increasing order.
-        let mut sides = HashMap::<[usize; 2], Vec<[[f64; 2]; 3]>>::new();
-        let normal = |[a, b]: [[f64; 2]; 2]| {
-            let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-            [(b[1] - a[1]) / length, (a[0] - b[0]) / length]
-        };
-        let along = |[a, b]: [[f64; 2]; 2], s: f64| [0, 1].map(|k| a[k] + s * (b[k] - a[k]));
-        let places = [0.0, 0.5, 1.0];
-        for (t, triangle) in mesh.triangles.iter().enumerate() {
-            let parts = stress.stresses(t).map(|points| Polynomial::through(degree, &points));
-            let corners = triangle.map(|node| mesh.nodes[node]);
-            let centroid = [0, 1].map(|k| corners.iter().map(|x| x[k]).sum::<f64>() / 3.0);
-            for (s, part) in parts.iter().enumerate() {
-                let ends = [corners[s], corners[(s + 1) % 3]];
-                for at in [ends[0], ends[1], centroid] {
-                    near(part.divergence(at), [-0.5, 2.0], "div τ");
-                }
-                let (spoke, before) = ([ends[0], centroid], &parts[(s + 2) % 3]);
-                for place in places {
-                    let (at, n) = (along(spoke, place), normal(spoke));
-                    near(part.traction(at, n), before.traction(at, n), "between parts");
-                }
-                let mut nodes = [triangle[s], triangle[(s + 1) % 3]];
-                nodes.sort();
-                let ends = nodes.map(|node| mesh.nodes[node]);
-                let traction = |place| part.traction(along(ends, place), normal(ends));
-                sides.entry(nodes).or_default().push(places.map(traction));
-            }
-        }
-        for tractions in sides.values().filter(|of| of.len() == 2) {
-            (0..3).for_each(|k| near(tractions[0][k], tractions[1][k], "between triangles"));
-        }
-        // Outward tractions of the boundary: that of a side whose nodes increase with the body on its left.
+        let (mesh, text) =
+            (layered(distorted(6)), format!("discretisation.displacement = {degree}\n{text}"));
+        let (sides, pressures) = balanced(mesh.clone(), &text, [0.5, -2.0]);
+        // The outward tractions of an edge of the square.
         let outward = |edge: &[usize; 2]| {
             let mut nodes = *edge;
             nodes.sort();
             let ends = nodes.map(|node| mesh.nodes[node]);
-            let n = normal(ends);
-            let [x, y] = along(ends, 0.5);
+            let ([x, y], n) = (along(ends, 0.5), normal(ends));
             let sign = if (x - 0.5) * n[0] + (y - 0.5) * n[1] > 0.0 { 1.0 } else { -1.0 };
-            (ends, sides[&nodes][0].map(|t| t.map(|component| sign * component)))
+            (ends, sides[&nodes].map(|traction| traction.map(|component| sign * component)))
         };
-        for edge in mesh.edges_of("right") {
-            let (ends, tractions) = outward(edge);
-            places
-                .iter()
-                .zip(tractions)
-                .for_each(|(place, t)| near(t, [along(ends, *place)[1], -1.0], "load"));
+        for (name, load) in [("right", [1.0, -1.0]), ("top", [0.0, 0.0])] {
+            for (ends, tractions) in mesh.edges_of(name).iter().map(outward) {
+                for (place, traction) in PLACES.into_iter().zip(tractions) {
+                    near(traction, [load[0] * along(ends, place)[1], load[1]], name);
+                }
+            }
         }
         let mut force = 0.0;
-        for (ends, [a, c, b]) in stress.pressures() {
+        for (ends, [a, c, b]) in pressures {
             assert!(a >= 0.0 && b >= 0.0 && c >= 0.0, "{a}, {c}, {b}");
-            let edges = mesh.edges_of("bottom").iter().map(outward);
-            let known = |(of, _): &([[f64; 2]; 2], _)| *of == ends || [of[1], of[0]] == ends;
-            let (of, tractions) = edges.clone().find(known).unwrap();
+            let mut edges = mesh.edges_of("bottom").iter().map(outward);
+            let is_known = |(of, _): &([[f64; 2]; 2], _)| *of == ends || [of[1], of[0]] == ends;
+            let (of, tractions) = edges.find(is_known).unwrap();
             let p = |s: f64| a * (1.0 - s).powi(2) + 2.0 * c * s * (1.0 - s) + b * s * s;
-            for (place, traction) in places.into_iter().zip(tractions) {
-                let s = if of == ends { place } else { 1.0 - place };
-                near(traction, [0.0, p(s)], "pressure");
+            for (place, traction) in PLACES.into_iter().zip(tractions) {
+                near(traction, [0.0, p(if of == ends { place } else { 1.0 - place })], "pressure");
             }
             force += (a + c + b) / 3.0 * (ends[0][0] - ends[1][0]).abs();
         }
         assert!(force > 0.1, "the body presses on its foundation: {force}");
+    }
+}
+
+#[test]
+fn the_stress_balances_the_loads_whatever_holds_the_body() {
+    let material = "material = { young = 100, poisson = 0.3, plane = 'strain' }";
+    let on_axes = "{ name = 'left', symmetry = true },
+        { name = 'bottom', symmetry = true },
+        { name = 'top', pressure = 2 }";
+    let by_contact = "{ name = 'left', gap = 0 },
+        { name = 'bottom', gap = 0 },
+        { name = 'top', traction = [-0.5, -1] }";
+    let on_skew_contact = "{ name = 'left', displacement = [0, 'free'] },
+        { name = 'right', displacement = [0.01, 'free'] },
+        { name = 'bottom', gap = 0.001, normal = [0.1, -1], traction = [0.2, -1] }";
+    for (boundary, force) in [(on_axes, 0.0), (by_contact, -1.0), (on_skew_contact, -3.0)] {
+        for degree in 1..=2 {
+            let text = format!(
+                "discretisation.displacement = {degree}\n{material}
+                 body = {{ force = [0, {force}] }}\nboundary = [{boundary}]"
+            );
+            balanced(unstructured(0.2), &text, [0.0, force]);
+        }
     }
 }
