@@ -5,7 +5,7 @@ The counts do not depend on the machine, so the ranks may share a few cores. `me
 difference of two runs with 6 and 12 steps of `square-mild` on the same mesh; each factor is made in both. Prints a table of
 Markdown for SPEED.md: with our factors, MUMPS and gamg.
 
-    ranks.py [--binary PATH] [--n 256] [--ranks 2 4 8 16 32 64]
+    ranks.py [--binary PATH] [--n 256] [--ranks 2 4 8 16 32 64] [--factors ours MUMPS gamg]
 """
 
 import argparse
@@ -45,6 +45,7 @@ def main():
     parser.add_argument("--binary", default=str(ROOT / "target/release/signorini"))
     parser.add_argument("--n", type=int, default=256, help="cells along a side of the square")
     parser.add_argument("--ranks", type=int, nargs="+", default=[2, 4, 8, 16, 32, 64])
+    parser.add_argument("--factors", nargs="+", default=list(PRECONDITIONERS), choices=list(PRECONDITIONERS))
     arguments = parser.parse_args()
     print("| ranks | factor | solves | messages | kB sent | collective calls | kB given | MB per rank |\n"
           "|---:|---|---:|---:|---:|---:|---:|---:|")
@@ -53,7 +54,8 @@ def main():
         subprocess.run(["mpicc", "-shared", "-fPIC", "-O1", "-o", folder / "messages.so",
                         Path(__file__).with_name("messages.c")], check=True)
         for ranks in arguments.ranks:
-            for factor, options in PRECONDITIONERS.items():
+            for factor in arguments.factors:
+                options = PRECONDITIONERS[factor]
                 try:
                     runs = [run(arguments.binary, arguments.n, ranks, steps, options, folder) for steps in STEPS]
                 except RuntimeError as error:
