@@ -104,3 +104,19 @@ struct Readme;
 /// Relative rounding of a sum over the nodes of a mesh: √n ε for n = 2²⁴ terms, as rounding errors have random signs
 /// (Higham, Accuracy and Stability of Numerical Algorithms, ch. 2). Smaller differences are not seen.
 pub(crate) const ROUNDING: f64 = 4096.0 * f64::EPSILON;
+
+/// Sorts `items` by their numbers below `count`, in linear time. It also returns per number where its items start, and the end.
+pub(crate) fn by_number<T: Copy + Default>(
+    count: usize,
+    items: impl Iterator<Item = (usize, T)> + Clone,
+) -> (Vec<usize>, Vec<T>) {
+    let mut starts = vec![0; count + 1];
+    items.clone().for_each(|(number, _)| starts[number + 1] += 1);
+    (0..count).for_each(|number| starts[number + 1] += starts[number]);
+    let (mut next, mut sorted) = (starts.clone(), vec![T::default(); starts[count]]);
+    for (number, item) in items {
+        sorted[next[number]] = item;
+        next[number] += 1;
+    }
+    (starts, sorted)
+}

@@ -7,6 +7,7 @@
 //! What crosses the door: a path comes in, a [`Mesh`] goes out. It is one connected body of triangles in
 //! counter-clockwise order, or a [`MeshError`] names the file and the line.
 
+use crate::by_number;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -158,7 +159,7 @@ fn smallest_angle(corners: [[f64; 2]; 3]) -> f64 {
 }
 
 /// One triangle's side of an edge.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct Side {
     /// The ends in increasing order.
     edge: [usize; 2],
@@ -179,14 +180,12 @@ impl Side {
 /// on the left, in this order.
 fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let of_triangle = |(triangle, &[a, b, c]): (usize, &[usize; 3])| {
-        [[a, b], [b, c], [c, a]].map(|[p, q]| Side {
-            edge: sorted([p, q]),
-            on_left: p < q,
-            triangle,
-        })
+        [[a, b], [b, c], [c, a]]
+            .map(|[p, q]| (p.min(q), Side { edge: sorted([p, q]), on_left: p < q, triangle }))
     };
-    let mut sides: Vec<Side> = triangles.iter().enumerate().flat_map(of_triangle).collect();
-    sides.sort_unstable();
+    let nodes = triangles.as_flattened().iter().max().map_or(0, |last| last + 1);
+    let (_, mut sides) = by_number(nodes, triangles.iter().enumerate().flat_map(of_triangle));
+    sides.chunk_by_mut(|a, b| a.edge[0] == b.edge[0]).for_each(<[_]>::sort_unstable);
     sides
 }
 

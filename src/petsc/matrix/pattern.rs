@@ -1,5 +1,7 @@
 //! The pattern of a sparse matrix.
 
+use crate::by_number;
+
 /// The positions of the entries in the rows of a rank, in compressed sparse rows (CSR): row i has the global
 /// columns `columns[starts[i]..starts[i + 1]]`, increasing.
 pub struct Pattern {
@@ -11,14 +13,7 @@ impl Pattern {
     /// The pattern with `rows` rows from the row and the global column of each entry. The order is free, and
     /// entries may repeat.
     pub fn new(rows: usize, entries: impl Iterator<Item = (usize, i32)> + Clone) -> Self {
-        let mut first = vec![0; rows + 1];
-        entries.clone().for_each(|(row, _)| first[row + 1] += 1);
-        (0..rows).for_each(|row| first[row + 1] += first[row]);
-        let (mut next, mut all) = (first.clone(), vec![0; first[rows]]);
-        for (row, column) in entries {
-            all[next[row]] = column;
-            next[row] += 1;
-        }
+        let (first, mut all) = by_number(rows, entries);
         let (mut starts, mut columns) = (vec![0], Vec::new());
         for span in first.windows(2) {
             let row = &mut all[span[0]..span[1]];
