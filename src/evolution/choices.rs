@@ -1,9 +1,8 @@
 //! The exchangeable parts of a run.
 
-use super::{DiscreteProblem, RunError};
 use crate::{
     contact::{ChosenSolver, ContactSolver},
-    model::{DamageSource, Fremond},
+    model::DamageSource,
     scene::Scene,
 };
 use std::rc::Rc;
@@ -14,7 +13,7 @@ use std::rc::Rc;
 pub struct Choices {
     pub(crate) solver: ChosenSolver,
     /// The damage source that another author wrote; `None` for the paper's source.
-    source: Option<Rc<dyn DamageSource>>,
+    pub(crate) source: Option<Rc<dyn DamageSource>>,
 }
 
 impl Choices {
@@ -26,17 +25,6 @@ impl Choices {
     /// The solver called `name` and the paper's damage source. A run tells whether there is a solver of this name.
     pub fn named(name: &str) -> Self {
         Self { solver: ChosenSolver::Named(name.to_owned()), source: None }
-    }
-
-    /// The damage source of `problem`.
-    ///
-    /// # Errors
-    /// A source of another author is given, but the scene has no evolving damage.
-    pub(crate) fn source(&self, problem: &DiscreteProblem) -> Result<&dyn DamageSource, RunError> {
-        match &self.source {
-            Some(_) if problem.damage().is_none() => Err(RunError::NoDamage),
-            source => Ok(source.as_deref().unwrap_or(&Fremond)),
-        }
     }
 
     /// These choices with the contact solver called `name`.

@@ -202,6 +202,7 @@ impl<'a> ContactStep<'a> {
             return Err(RunError::Step { step, time, source });
         }
         Ok(Step {
+            strains: observation.strained.strains,
             state,
             record,
             figures,

@@ -1,14 +1,15 @@
 //! The damage step (28): ζ_n from ζ_{n−1} and u_{n−1}.
 
-use super::{DiscreteProblem, Phases, RunError, State, StepFailure, agreed};
+use super::{DiscreteProblem, Phases, RunError, Step, StepFailure, agreed};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     linear::FactorState,
-    model::DamageSource,
+    model::{DamageSource, Fremond},
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
+use std::mem;
 
 /// A planned step from t_{n−1} to t_n, with the damage system (M + kκL) ζ_n = M · `start` + k · `load`.
 pub(crate) struct PlannedStep {
@@ -44,7 +45,8 @@ pub(crate) struct DamageStep<'a> {
     pub(crate) session: &'a Session,
     pub(crate) problem: &'a DiscreteProblem,
     pub(crate) phases: &'a Phases,
-    pub(crate) law: &'a dyn DamageSource,
+    /// The damage source that another author wrote; `None` for the paper's source.
+    pub(crate) law: Option<&'a dyn DamageSource>,
     /// k and M + kκL, made by the first step that needs it.
     pub(crate) system: Option<(f64, DamageSystem)>,
     /// The factor of a checkpoint for that system.
@@ -74,25 +76,32 @@ pub(crate) struct DamageUpdate {
 pub(super) const MAX_BALANCE: f64 = 1e-10;
 
 impl DamageStep<'_> {
-    /// The damage source of the state after step `step`. Collective.
+    /// The damage source of a step that the contact step returned. Collective.
     ///
     /// # Errors
     /// φ is positive or no number.
-    pub(crate) fn source(&self, step: usize, state: &State) -> Result<SourceLoad, RunError> {
+    pub(crate) fn source(&self, step: &mut Step) -> Result<SourceLoad, RunError> {
         let (problem, body) = (self.problem, &self.problem.body);
+        let (strains, state) = (mem::take(&mut step.strains), &step.state);
         let Some(laws) = problem.damage() else {
             return Ok(SourceLoad { load: DVector::zeros(state.zeta.len()), min: 0.0 });
         };
         self.phases.time("damage source", || {
             let comm = body.vertices.partition.comm();
-            let phi = fem::source(body, (self.law, laws), &body.strains(&state.u), &state.zeta);
+            // The paper's source becomes part of the loop over the triangles.
+            let phi = match self.law {
+                Some(law) => fem::source(body, (law, laws), &strains, &state.zeta),
+                None => fem::source(body, (&Fremond, laws), &strains, &state.zeta),
+            };
             let failed = |source| RunError::Step {
-                step,
+                step: step.record.step,
                 time: state.time,
                 source: StepFailure::Source(source),
             };
             let phi = agreed(comm, phi.map_err(failed))?;
-            let min = comm.min(phi.iter().flatten().copied().fold(0.0, f64::min));
+            // Three minima are faster than one.
+            let min = phi.iter().fold([0.0; 3], |min, phi| [0, 1, 2].map(|q| phi[q].min(min[q])));
+            let min = comm.min(min.into_iter().fold(0.0, f64::min));
             let load = fem::source_load(body, problem.mass(), &phi);
             Ok(SourceLoad { load: DVector::from_vec(load), min })
         })

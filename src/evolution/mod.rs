@@ -55,6 +55,7 @@ pub(crate) use step_controller::StepController;
 
 use crate::{
     linear::FactorState,
+    model::Fremond,
     petsc::{Communicator, Session},
     problem::{LoadCase, LoadCurve},
 };
@@ -78,7 +79,10 @@ pub(crate) fn all_steps<'a>(
     saved: Option<RunState>,
     followed: &'a [f64],
 ) -> Result<Run<'a>, RunError> {
-    let law = choices.source(problem)?;
+    let law = choices.source.as_deref();
+    if law.is_some() && problem.damage().is_none() {
+        return Err(RunError::NoDamage);
+    }
     let damage_step = DamageStep { session, problem, phases, law, system: None, loaded: None };
     let mut contact_step = ContactStep::new(session, problem, choices, phases)?;
     let (zeta, start) = (problem.initial_damage(), problem.scene().start());
@@ -87,9 +91,9 @@ pub(crate) fn all_steps<'a>(
         // (27): u_0 from ζ_0.
         first = contact_step.solve(0, start, &zeta)?;
         contact_step.accept(start)?;
-        source = damage_step.source(0, &first.state)?;
+        source = damage_step.source(&mut first)?;
     }
-    let controller = StepController::new(problem, law, &zeta, source, followed);
+    let controller = StepController::new(problem, law.unwrap_or(&Fremond), &zeta, source, followed);
     let outcome = Outcome::new(first, problem);
     let mut run = Run { damage_step, contact_step, controller, outcome };
     match saved {

@@ -6,6 +6,7 @@ use crate::{
     fem::{DamageCertificate, RigidMotion},
     problem::{Figure, Observation, Value},
 };
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// A step with its certified answer.
@@ -24,6 +25,9 @@ pub struct Step {
     /// The effort of the contact solve; not in archives.
     #[serde(skip)]
     pub report: ContactReport,
+    /// The strains at the quadrature points, until the damage source takes them.
+    #[serde(skip)]
+    pub(super) strains: Vec<Vector3<f64>>,
     /// A rigid motion that the active nodes leave unconstrained, if there is one.
     pub unconstrained: Option<RigidMotion>,
     /// Was the damage solve skipped?

@@ -169,17 +169,14 @@ impl Body {
         }
     }
 
-    /// A field with `block` components from the vertices to the nodes of u. The midpoint of an edge gets the
-    /// mean of its ends.
-    pub fn at_nodes(&self, field: &[f64], block: usize) -> Vec<f64> {
+    /// A field from the vertices to the nodes of u. The midpoint of an edge gets the mean of its ends.
+    pub fn at_nodes(&self, field: &[f64]) -> Vec<f64> {
         let Some(nodes) = self.quadratic_nodes() else { return field.to_vec() };
-        let mut values = vec![0.0; block * self.nodes.points.len()];
+        let mut values = vec![0.0; self.nodes.points.len()];
         for (vertices, nodes) in self.mesh.triangles.iter().zip(nodes) {
-            for k in 0..block {
-                let [p, q, r] = vertices.map(|vertex| field[block * vertex + k]);
-                let own = [p, q, r, 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)];
-                nodes.iter().zip(own).for_each(|(&node, value)| values[block * node + k] = value);
-            }
+            let [p, q, r] = vertices.map(|vertex| field[vertex]);
+            let own = [p, q, r, 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)];
+            nodes.iter().zip(own).for_each(|(&node, value)| values[node] = value);
         }
         values
     }

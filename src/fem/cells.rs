@@ -34,7 +34,7 @@ pub(crate) use for_elements;
 
 impl<'a, const N: usize, const Q: usize> Cells<'a, N, Q> {
     /// N and the nodes of all elements, N in turn for each.
-    pub(super) fn flat_nodes(self) -> (usize, &'a [usize]) {
+    pub(crate) fn flat_nodes(self) -> (usize, &'a [usize]) {
         (N, self.nodes.as_flattened())
     }
 

@@ -53,12 +53,15 @@ pub struct WrongSource {
 /// φ is positive or no number at a point.
 pub fn source(
     body: &Body,
-    (source, laws): (&dyn DamageSource, &[DamageLaw]),
+    (source, laws): (&(impl DamageSource + ?Sized), &[DamageLaw]),
     strains: &[Vector3<f64>],
     zeta: &[f64],
 ) -> Result<Vec<[f64; 3]>, WrongSource> {
-    let points = |t: usize| {
-        let (law, nodes) = (&laws[body.material(t)], body.mesh.triangles[t]);
+    // A NaN, which is neither less nor equal, is refused too.
+    let is_wrong = |phi: &f64| !matches!(phi.partial_cmp(&0.0), Some(Less | Equal));
+    let mut phi = Vec::with_capacity(body.mesh.triangles.len());
+    for (t, nodes) in body.mesh.triangles.iter().enumerate() {
+        let law = &laws[body.material(t)];
         let (vertices, corners) = (nodes.map(|n| zeta[n]), nodes.map(|n| body.mesh.nodes[n]));
         let (strains, zeta, places) = match body.order() {
             Order::Linear => ([&strains[t]; 3], vertices, corners),
@@ -68,15 +71,15 @@ pub fn source(
                 (strains.as_chunks().0[t].each_ref(), at_quadratic_points(vertices), places)
             }
         };
-        [0, 1, 2].map(|q| DamagePoint { place: places[q], strain: strains[q], zeta: zeta[q], law })
-    };
-    let triangles = 0..body.mesh.triangles.len();
-    let phi: Vec<_> = triangles.map(|t| source.of_triangle(&points(t))).collect();
-    // A NaN, which is neither less nor equal, is refused too.
-    let is_wrong = |phi: &f64| !matches!(phi.partial_cmp(&0.0), Some(Less | Equal));
-    let Some(at) = phi.as_flattened().iter().position(is_wrong) else { return Ok(phi) };
-    let DamagePoint { place, zeta, .. } = points(at / 3)[at % 3];
-    Err(WrongSource { phi: phi[at / 3][at % 3], place, zeta })
+        let values = [0, 1, 2].map(|q| {
+            source.source(&DamagePoint { place: places[q], strain: strains[q], zeta: zeta[q], law })
+        });
+        if let Some(q) = values.iter().position(is_wrong) {
+            return Err(WrongSource { phi: values[q], place: places[q], zeta: zeta[q] });
+        }
+        phi.push(values);
+    }
+    Ok(phi)
 }
 
 /// The load b_i = ∫ φ λ_i, m²/s, of a source φ from [`source`]. For P1 φ is affine between the vertices; for

@@ -1,9 +1,9 @@
 //! Polynomials fitted to the strains around each vertex.
 
 use super::{Body, Cells, POINTS, Partition, for_elements, quadratic_values};
-use crate::{ROUNDING, petsc::PetscError};
-use nalgebra::{Matrix6x3, SMatrix, SVector, Vector3, Vector6};
-use std::{iter, ops::Range};
+use crate::{ROUNDING, by_number, petsc::PetscError};
+use nalgebra::{Matrix3x6, SMatrix, SVector, Vector3, Vector6};
+use std::ops::Range;
 
 /// Triangles needed to fit a polynomial at a vertex. A vertex with fewer takes the mean of the fits of its
 /// neighbours.
@@ -12,8 +12,8 @@ use std::{iter, ops::Range};
 /// triangles, and a bar of 15 other scenes fails.
 const TRIANGLES_TO_FIT: usize = 4;
 
-/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (rows).
-type Fit = Matrix6x3<f64>;
+/// A strain (ε_xx, ε_yy, 2ε_xy) as a polynomial about a vertex: the coefficients of 1, x, y, x², xy, y² (columns).
+type Fit = Matrix3x6<f64>;
 
 /// The fits around each vertex as linear functions of the strains.
 ///
@@ -38,11 +38,13 @@ pub(crate) struct Patches {
 #[derive(Debug)]
 struct TrianglesAround {
     triangles: Vec<usize>,
-    /// Per vertex: where its triangles end in the list.
-    ends: Vec<usize>,
+    /// Per vertex: where its triangles start in the list; then the end.
+    starts: Vec<usize>,
     /// Per quadrature point of the triangles in the list: the factors of its strain in the coefficients of the fit. There are 3
     /// for linear and 6 for quadratic elements.
     factors: Vec<f64>,
+    /// The vertices of this rank with too few triangles, if any.
+    few: Vec<usize>,
 }
 
 impl TrianglesAround {
@@ -50,23 +52,14 @@ impl TrianglesAround {
     fn new(body: &Body, material: usize) -> Self {
         let triangles = body.mesh.triangles.iter().enumerate();
         let own = triangles.filter(|(t, _)| body.material(*t) == material);
-        // `ends` first holds the start of each vertex's list; each entry moves it towards the end of the list.
-        let mut ends = vec![0; body.mesh.nodes.len() + 1];
-        own.clone().flat_map(|(_, triangle)| triangle).for_each(|&vertex| ends[vertex + 1] += 1);
-        (1..ends.len()).for_each(|i| ends[i] += ends[i - 1]);
-        let mut triangles = vec![0; ends[ends.len() - 1]];
-        for (t, triangle) in own {
-            for &vertex in triangle {
-                triangles[ends[vertex]] = t;
-                ends[vertex] += 1;
-            }
-        }
-        Self { triangles, ends, factors: Vec::new() }
+        let around = own.flat_map(|(t, triangle)| triangle.map(|vertex| (vertex, t)));
+        let (starts, triangles) = by_number(body.mesh.nodes.len(), around);
+        Self { triangles, starts, factors: Vec::new(), few: Vec::new() }
     }
 
     /// The places of the triangles of a vertex in the list.
     fn places(&self, vertex: usize) -> Range<usize> {
-        vertex.checked_sub(1).map_or(0, |before| self.ends[before])..self.ends[vertex]
+        self.starts[vertex]..self.starts[vertex + 1]
     }
 
     fn of(&self, vertex: usize) -> &[usize] {
@@ -89,26 +82,31 @@ impl Patches {
             around: (0..=last).map(|material| TrianglesAround::new(body, material)).collect(),
         };
         for material in 0..=last {
-            patches.around[material].factors = patches.factors(&patches.around[material], &samples);
+            let (few, factors) = patches.factors(&patches.around[material], &samples);
+            (patches.around[material].few, patches.around[material].factors) = (few, factors);
         }
         patches
     }
 
-    /// The factors of the fits to strains at the `samples`, of as high a degree as the triangles of a vertex allow.
-    fn factors(&self, around: &TrianglesAround, samples: &[[f64; 2]]) -> Vec<f64> {
-        let (points, mut factors) = (self.per_triangle, Vec::new());
+    /// The vertices with too few triangles, and the factors of the fits to strains at the `samples`, of as high a degree as the
+    /// triangles of a vertex allow.
+    fn factors(&self, around: &TrianglesAround, samples: &[[f64; 2]]) -> (Vec<usize>, Vec<f64>) {
+        let (mut factors, mut few) = (Vec::new(), Vec::new());
+        let (points, count) = (self.per_triangle, if self.per_triangle > 1 { 6 } else { 3 });
         for vertex in 0..self.owned {
             let own = around.of(vertex).iter().flat_map(|t| points * t..points * (t + 1));
             let (at, own) = (self.vertices[vertex], own.map(|q| samples[q]));
-            match (points, self.has_own_fit(around, vertex)) {
-                _ if self.is_near_jump(vertex) => fit::<1>(at, own, points, &mut factors),
-                (1, true) => fit::<3>(at, own, points, &mut factors),
-                (1, false) => fit::<1>(at, own, points, &mut factors),
-                (_, true) => fit::<6>(at, own, points, &mut factors),
-                (_, false) => fit::<3>(at, own, points, &mut factors),
+            let has_own = self.has_own_fit(around, vertex);
+            few.extend((!has_own && !around.of(vertex).is_empty()).then_some(vertex));
+            match (points, has_own) {
+                _ if self.is_near_jump(vertex) => fit::<1>(at, own, count, &mut factors),
+                (1, true) => fit::<3>(at, own, count, &mut factors),
+                (1, false) => fit::<1>(at, own, count, &mut factors),
+                (_, true) => fit::<6>(at, own, count, &mut factors),
+                (_, false) => fit::<3>(at, own, count, &mut factors),
             }
         }
-        factors
+        (few, factors)
     }
 
     fn is_near_jump(&self, vertex: usize) -> bool {
@@ -128,29 +126,32 @@ impl Patches {
         strains: &[Vector3<f64>],
         vertices: Option<&Partition>,
     ) -> Result<Vec<Fits>, PetscError> {
-        self.around.iter().map(|around| self.fits_of_material(around, strains, vertices)).collect()
+        let fits = |around| match self.per_triangle {
+            1 => self.fits_of_material::<1, 3>(around, strains, vertices),
+            _ => self.fits_of_material::<3, 6>(around, strains, vertices),
+        };
+        self.around.iter().map(fits).collect()
     }
 
-    fn fits_of_material(
+    /// The same for a material, with Q quadrature points in a triangle and C coefficients.
+    fn fits_of_material<const Q: usize, const C: usize>(
         &self,
         around: &TrianglesAround,
         strains: &[Vector3<f64>],
         partition: Option<&Partition>,
     ) -> Result<Fits, PetscError> {
-        let (points, coefficients) = (self.per_triangle, coefficients(self.per_triangle));
+        let strains = strains.as_chunks::<Q>().0;
+        let factors = around.factors.as_chunks::<C>().0.as_chunks::<Q>().0;
         let set_own = |fits: &mut Fits, vertex: usize| {
-            let places = around.places(vertex);
-            let factors = &around.factors[coefficients * points * places.start..];
-            let own = around.triangles[places].iter().flat_map(|t| points * t..points * (t + 1));
-            let [fit @ .., known] = fits.entries_mut(vertex) else { return };
-            for (factors, q) in factors.chunks_exact(coefficients).zip(own) {
-                for (coefficient, factor) in fit.chunks_exact_mut(3).zip(factors) {
-                    (0..3).for_each(|i| coefficient[i] += factor * strains[q][i]);
+            let (places, mut sums) = (around.places(vertex), [[0.0; C]; 3]);
+            for (factors, &t) in factors[places.clone()].iter().zip(&around.triangles[places]) {
+                for (factors, strain) in factors.iter().zip(&strains[t]) {
+                    (0..3).for_each(|i| (0..C).for_each(|k| sums[i][k] += factors[k] * strain[i]));
                 }
             }
-            *known = 1.0;
+            fits.set(vertex, SMatrix::<f64, 3, C>::from_fn(|i, k| sums[i][k]).as_slice());
         };
-        let width = 3 * coefficients + 1;
+        let width = 3 * C + 1;
         let mut fits = Fits { width, entries: vec![0.0; width * self.vertices.len()] };
         let update = |fits: &mut Fits| match partition {
             Some(partition) => partition.update(&mut fits.entries, width),
@@ -173,17 +174,15 @@ impl Patches {
                 });
                 (count > 0.0).then(|| (vertex, sum / count))
             };
-            let left = (0..self.owned).filter(|&vertex| !fits.is_known(vertex));
+            let left = around.few.iter().copied().filter(|&vertex| !fits.is_known(vertex));
             let left = left.filter(|&vertex| around.of(vertex).len() <= most);
             for (vertex, fit) in Vec::from_iter(left.filter_map(mean)) {
-                let fit = fit.transpose();
-                let known = fit.iter().take(width - 1).copied().chain([1.0]);
-                fits.entries_mut(vertex).iter_mut().zip(known).for_each(|(to, from)| *to = from);
+                fits.set(vertex, &fit.as_slice()[..3 * C]);
             }
             update(&mut fits)?;
         }
         // Other vertices, as in strips one triangle thick, take a fit of the strains' degree: one triangle suffices.
-        for vertex in 0..self.owned {
+        for &vertex in &around.few {
             if !fits.is_known(vertex) {
                 set_own(&mut fits, vertex);
             }
@@ -191,11 +190,6 @@ impl Patches {
         update(&mut fits)?;
         Ok(fits)
     }
-}
-
-/// The coefficients of a fit, with this number of quadrature points in a triangle.
-fn coefficients(per_triangle: usize) -> usize {
-    if per_triangle > 1 { 6 } else { 3 }
 }
 
 /// The fits of all vertices to the strains of a material.
@@ -206,8 +200,10 @@ pub(crate) struct Fits {
 }
 
 impl Fits {
-    fn entries_mut(&mut self, vertex: usize) -> &mut [f64] {
-        &mut self.entries[self.width * vertex..self.width * (vertex + 1)]
+    fn set(&mut self, vertex: usize, fit: &[f64]) {
+        let entries = &mut self.entries[self.width * vertex..self.width * (vertex + 1)];
+        entries[..fit.len()].copy_from_slice(fit);
+        entries[fit.len()] = 1.0;
     }
 
     fn entries(&self, vertex: usize) -> &[f64] {
@@ -219,9 +215,15 @@ impl Fits {
     }
 
     fn get(&self, vertex: usize) -> Option<Fit> {
-        let entries = &self.entries(vertex)[..self.width - 1];
-        let entries = entries.iter().copied().chain(iter::repeat(0.0));
-        self.is_known(vertex).then(|| Fit::from_row_iterator(entries.take(18)))
+        let mut fit = Fit::zeros();
+        let [entries @ .., _] = self.entries(vertex) else { return None };
+        fit.as_mut_slice()[..entries.len()].copy_from_slice(entries);
+        self.is_known(vertex).then_some(fit)
+    }
+
+    /// The fit at its vertex.
+    pub(crate) fn at_vertex(&self, vertex: usize) -> Vector3<f64> {
+        Vector3::from_column_slice(&self.entries(vertex)[..3])
     }
 
     /// The fit of a vertex at a point with this offset from it, m.
@@ -250,12 +252,12 @@ fn sample_points<const N: usize, const Q: usize>(
     cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
 }
 
-/// Adds the factors of the strains at the `samples` in the polynomial about `centre` that is nearest to them, in least squares,
-/// with the first N coefficients: N is 1, 3 or 6 for the degrees 0, 1, 2.
+/// Adds the `count` factors of each strain at the `samples` in the polynomial about `centre` that is nearest to them, in
+/// least squares, with the first N coefficients: N is 1, 3 or 6 for the degrees 0, 1, 2.
 fn fit<const N: usize>(
     centre: [f64; 2],
     samples: impl Iterator<Item = [f64; 2]> + Clone,
-    per_triangle: usize,
+    count: usize,
     factors: &mut Vec<f64>,
 ) {
     let offset = |x: [f64; 2]| [x[0] - centre[0], x[1] - centre[1]];
@@ -270,14 +272,14 @@ fn fit<const N: usize>(
     let rounding = ROUNDING * normal.trace();
     (0..N).for_each(|i| normal[(i, i)] += rounding);
     let Some(factor) = normal.cholesky() else {
-        factors.extend(samples.flat_map(|_| vec![0.0; coefficients(per_triangle)]));
+        factors.extend(samples.flat_map(|_| vec![0.0; count]));
         return;
     };
     for x in samples {
         let found = factor.solve(&row(x));
         let scaled = [0, 1, 1, 2, 2, 2].into_iter().zip(found.iter());
         let scaled = scaled.map(|(degree, of)| of * size.powi(-degree));
-        factors.extend(scaled.chain([0.0; 6]).take(coefficients(per_triangle)));
+        factors.extend(scaled.chain([0.0; 6]).take(count));
     }
 }
 
@@ -290,8 +292,8 @@ fn monomials([x, y]: [f64; 2]) -> Vector6<f64> {
 fn moved(fit: &Fit, from: [f64; 2], to: [f64; 2]) -> Fit {
     let [x, y] = [to[0] - from[0], to[1] - from[1]];
     let mut moved = *fit;
-    moved.set_row(0, &(monomials([x, y]).transpose() * fit));
-    moved.set_row(1, &(fit.row(1) + 2.0 * x * fit.row(3) + y * fit.row(4)));
-    moved.set_row(2, &(fit.row(2) + x * fit.row(4) + 2.0 * y * fit.row(5)));
+    moved.set_column(0, &(fit * monomials([x, y])));
+    moved.set_column(1, &(fit.column(1) + 2.0 * x * fit.column(3) + y * fit.column(4)));
+    moved.set_column(2, &(fit.column(2) + x * fit.column(4) + 2.0 * y * fit.column(5)));
     moved
 }

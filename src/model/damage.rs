@@ -22,11 +22,6 @@ pub trait DamageSource {
     /// φ(ε, ζ) ≤ 0 at a point, 1/s.
     fn source(&self, point: &DamagePoint) -> f64;
 
-    /// φ at three points of a triangle.
-    fn of_triangle(&self, points: &[DamagePoint; 3]) -> [f64; 3] {
-        points.each_ref().map(|point| self.source(point))
-    }
-
     /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ, for ζ′ = `rate`. The errors of the
     /// time steps follow from it. The default, [`DamageLaw::error_growth`], holds for every
     /// φ = −(λ_D (1 − ζ)/ζ + Ψ(ε) − λ_W)₊ with a quadratic Ψ.

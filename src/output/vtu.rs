@@ -207,7 +207,7 @@ fn point_data(
     }
     partition.update(&mut pressure, 1)?;
     partition.update(&mut gap, 1)?;
-    let zeta = problem.body.at_nodes(&state.zeta, 1);
+    let zeta = problem.body.at_nodes(&state.zeta);
     let displacement = points.nodes().flat_map(|i| [state.u[2 * i], state.u[2 * i + 1], 0.0]);
     let scalar = |name, values: &[f64]| {
         DataArray::new(name, REAL, 1, points.nodes().map(|node| values[node]))

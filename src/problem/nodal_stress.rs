@@ -3,7 +3,7 @@
 use super::{DiscreteProblem, State, Value, figures::greatest};
 use crate::{
     ROUNDING,
-    fem::{Partition, Patches, RigidMotion, for_elements},
+    fem::{Fits, Partition, Patches, RigidMotion, for_elements},
     model::{Material, von_mises},
     petsc::PetscError,
 };
@@ -39,8 +39,9 @@ pub(crate) struct Point {
 pub struct Strained {
     /// ε(u) at the quadrature points.
     pub(crate) strains: Vec<Vector3<f64>>,
-    /// η_*(ζ) at the nodes.
-    pub(crate) zeta: Vec<f64>,
+    /// ζ at the vertices, and ζ_*.
+    zeta: Vec<f64>,
+    threshold: f64,
 }
 
 impl NodalStress {
@@ -51,10 +52,10 @@ impl NodalStress {
         let mut points: Vec<Point> = body.nodes.points.iter().map(unset).collect();
         let mut copies = HashMap::default();
         let mut cells = Vec::new();
-        let nodes_of = |t: usize| for_elements!(body, cells => cells.nodes[t].to_vec());
+        let (count, nodes) = for_elements!(body, cells => cells.flat_nodes());
         for (t, vertices) in body.mesh.triangles.iter().enumerate() {
             let material = body.material(t);
-            for (i, node) in nodes_of(t).into_iter().enumerate() {
+            for (i, &node) in nodes[count * t..count * (t + 1)].iter().enumerate() {
                 let ends = [vertices[i % 3], vertices[if i < 3 { i } else { (i + 1) % 3 }]];
                 let point = Point { node, material, at: body.nodes.points[node], ends };
                 let index = match points[node].material {
@@ -87,9 +88,8 @@ impl NodalStress {
 
     /// What the stresses of `state` are made from.
     pub fn strained(problem: &DiscreteProblem, state: &State) -> Strained {
-        let body = &problem.body;
-        let (strains, zeta) = (body.strains(&state.u), body.at_nodes(&state.zeta, 1));
-        Strained { strains, zeta: zeta.into_iter().map(|zeta| problem.truncated(zeta)).collect() }
+        let (strains, zeta) = (problem.body.strains(&state.u), state.zeta.clone());
+        Strained { strains, zeta, threshold: problem.threshold() }
     }
 
     /// The stresses (σ_xx, σ_yy, σ_xy, σ_zz) at the points, Pa. `vertices` is the division of the vertices among
@@ -103,22 +103,25 @@ impl NodalStress {
         vertices: Option<&Partition>,
     ) -> Result<Vec<[f64; 4]>, PetscError> {
         let fits = self.patches.fits(&strained.strains, vertices)?;
-        let stress = |point: &Point| {
-            let [x, y] = point.at;
-            let strain = |end: usize| {
-                let [vx, vy] = self.patches.vertices[end];
-                fits[point.material].value(end, [x - vx, y - vy])
-            };
-            let [first, last] = point.ends;
-            let strain = match first == last {
-                true => strain(first),
-                false => 0.5 * (strain(first) + strain(last)),
-            };
-            let (material, stiffness) = &self.materials[point.material];
-            let stress = stiffness * strain * strained.zeta[point.node];
-            [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
+        Ok(self.points.iter().map(|point| self.stress(point, strained, &fits)).collect())
+    }
+
+    /// The stress at a point, with the fits of the strains.
+    #[inline(always)]
+    fn stress(&self, point: &Point, strained: &Strained, fits: &[Fits]) -> [f64; 4] {
+        let ([x, y], [first, last], fits) = (point.at, point.ends, &fits[point.material]);
+        let strain = |end: usize| {
+            let [vx, vy] = self.patches.vertices[end];
+            fits.value(end, [x - vx, y - vy])
         };
-        Ok(self.points.iter().map(stress).collect())
+        let strain = match first == last {
+            true => fits.at_vertex(first),
+            false => 0.5 * (strain(first) + strain(last)),
+        };
+        let (material, stiffness) = &self.materials[point.material];
+        let zeta = 0.5 * (strained.zeta[first] + strained.zeta[last]);
+        let stress = stiffness * strain * zeta.clamp(strained.threshold, 1.0);
+        [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
     }
 }
 
@@ -142,36 +145,36 @@ impl DiscreteProblem {
     ///
     /// # Errors
     /// PETSc failed.
-    pub(crate) fn extreme_stresses(&self, state: &State) -> Result<Vec<[Value; 3]>, PetscError> {
+    pub(crate) fn extreme_stresses(&self, of: &Strained) -> Result<Vec<[Value; 3]>, PetscError> {
         let (nodal, body) = (self.nodal_stress(), &self.body);
-        let strained = NodalStress::strained(self, &self.strained(state));
-        let stresses = nodal.stresses(&strained, Some(&body.vertices.partition))?;
-        let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; self.materials.len().max(1)];
-        for (stress, point) in stresses.iter().zip(&nodal.points) {
-            let [most, least] = principal(*stress);
-            let is_own = |(number, _): &(usize, String)| *number == point.material;
-            let part = self.materials.iter().position(is_own).unwrap_or(0);
-            for (largest, value) in largest[part].iter_mut().zip([von_mises(*stress), most, -least])
-            {
+        let fits = nodal.patches.fits(&of.strains, Some(&body.vertices.partition))?;
+        let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; nodal.materials.len()];
+        for point in &nodal.points {
+            let stress = nodal.stress(point, of, &fits);
+            let [most, least] = principal(stress);
+            let values = [von_mises(stress), most, -least];
+            for (largest, value) in largest[point.material].iter_mut().zip(values) {
                 if value >= largest.0 {
                     *largest = (value, point.at);
                 }
             }
         }
         let comm = body.nodes.partition.comm();
-        let of = |parts: &[[(f64, [f64; 2]); 3]]| {
+        let extremes = |parts: &[[(f64, [f64; 2]); 3]]| {
             let [von_mises, most, least] =
                 [0, 1, 2].map(|k| greatest(comm, parts.iter().map(|part| part[k])));
             [von_mises, most, Value { value: -least.value, ..least }]
         };
-        let parts = if largest.len() > 1 { &largest[..] } else { &[] };
-        Ok([of(&largest)].into_iter().chain(parts.chunks(1).map(of)).collect())
+        let parts = if self.materials.len() > 1 { &self.materials[..] } else { &[] };
+        let parts = parts.iter().map(|(number, _)| extremes(&largest[*number..=*number]));
+        Ok([extremes(&largest)].into_iter().chain(parts).collect())
     }
 }
 
 /// The principal stresses σ₁ ≥ σ₂ in the plane, Pa.
 pub fn principal([xx, yy, xy, _]: [f64; 4]) -> [f64; 2] {
-    let (mean, radius) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
+    let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
+    let radius = (half * half + xy * xy).sqrt();
     [mean + radius, mean - radius]
 }
 

@@ -179,7 +179,7 @@ fn the_weights_of_the_nodes_add_up_to_the_area() {
         close(body.nodes.weights.iter().sum(), 1.0, 1e-14);
         let affine: Vec<f64> = body.mesh.nodes.iter().map(|[x, y]| 1.0 + 2.0 * x - y).collect();
         close(body.mean(&affine), 1.5, 1e-14);
-        let affine = body.at_nodes(&affine, 1);
+        let affine = body.at_nodes(&affine);
         close(affine.iter().zip(&body.nodes.weights).map(|(v, w)| v * w).sum(), 1.5, 1e-14);
     }
 }

@@ -123,8 +123,8 @@ fn the_whole_bridge_is_symmetric_and_twice_its_half() {
         let answers = agreed("bridge", &whole).into_iter().zip(agreed("bridge-half", &half));
         for (solver, ((_, full), (_, part))) in SOLVERS.iter().zip(answers) {
             let (full, part) = (full.last, part.last);
-            let full_zeta = whole.body.at_nodes(&full.state.zeta, 1);
-            let part_zeta = half.body.at_nodes(&part.state.zeta, 1);
+            let full_zeta = whole.body.at_nodes(&full.state.zeta);
+            let part_zeta = half.body.at_nodes(&part.state.zeta);
             let size = largest(&full.state.u);
             let nodes = &whole.body.nodes.points;
             for (i, [x, y]) in nodes.iter().enumerate() {

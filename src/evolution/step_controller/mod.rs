@@ -172,10 +172,10 @@ impl<'a> StepController<'a> {
         &mut self,
         planned: &PlannedStep,
         damage: &DamageUpdate,
-        step: Box<Step>,
+        mut step: Box<Step>,
         damage_step: &mut DamageStep,
     ) -> Result<Decision, RunError> {
-        let source = damage_step.source(planned.n, &step.state)?;
+        let source = damage_step.source(&mut step)?;
         let missing = if self.two_step { &source.load - &planned.load } else { DVector::zeros(0) };
         let correction = damage_step.correction(planned, missing.as_slice())?;
         let correction = correction.ok_or_else(|| planned.failed(StepFailure::Damage))?;

@@ -3,8 +3,12 @@
 use super::{SHOWN_AS_ZERO, Value};
 use crate::{
     petsc::{Communicator, PetscError},
-    problem::{ContactFigures, ContactRow, DiscreteProblem, MeanDisplacement, State, rows_of},
+    problem::{
+        ContactFigures, ContactRow, DiscreteProblem, MeanDisplacement, NodalStress, State,
+        Strained, rows_of,
+    },
 };
+use std::cell::LazyCell;
 
 /// The quantities from which figures take their values. The state is that of this rank; all other quantities are sums or extremes
 /// over the ranks.
@@ -23,6 +27,8 @@ pub(crate) struct Observation<'a> {
     /// The largest von Mises stress, the largest σ₁ and the smallest σ₂, Pa: first those of the body, then those of each
     /// material if there are several.
     pub stresses: Vec<[Value; 3]>,
+    /// From which the stresses are made; without strains if the body only moves rigidly.
+    pub strained: Strained,
     /// The figures of Γ_C, then those of each foundation.
     pub contact: Vec<ContactFigures>,
     /// Per support: F_x, F_y, N per metre of thickness, and the moment about the origin, N.
@@ -66,7 +72,7 @@ impl<'a> Observation<'a> {
     ) -> Result<Self, PetscError> {
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let comm = partition.comm();
-        let zeta = problem.zeta_at_points(&state.zeta);
+        let zeta = LazyCell::new(|| problem.zeta_at_points(&state.zeta));
         let stress = |t: usize, at: [f64; 3]| {
             problem.terms.elasticity.stress_at(body, (t, at), &zeta, &state.u)
         };
@@ -82,6 +88,7 @@ impl<'a> Observation<'a> {
         let vertices =
             state.zeta.iter().zip(&body.mesh.nodes).take(body.vertices.partition.owned());
         let least = greatest(comm, vertices.map(|(zeta, at)| (-zeta, *at)));
+        let strained = NodalStress::strained(problem, &problem.strained(state));
         let active = state.contact.iter().filter(|point| point.active);
         Ok(Self {
             problem,
@@ -91,7 +98,8 @@ impl<'a> Observation<'a> {
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.
             contact_force: comm.total(active.map(|point| point.force).sum()) + 0.0,
-            stresses: problem.extreme_stresses(state)?,
+            stresses: problem.extreme_stresses(&strained)?,
+            strained,
             contact: [of_rows(&rows)].into_iter().chain(foundations).collect(),
             resultants,
             means: problem.mean_displacements(state),
