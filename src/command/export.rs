@@ -115,7 +115,7 @@ fn files(
     let gaps = bounds.iter().flat_map(sides).filter(|(_, gap)| gap.is_finite());
     let (b_rows, g): (Vec<_>, Vec<_>) = gaps.unzip();
     let mut stiffness =
-        Stiffness::new(session, body, &problem.terms, &NodalBases::identity(points.len()))?;
+        Stiffness::new(session, body, &problem.elasticity, &NodalBases::identity(points.len()))?;
     stiffness.set_damage(body, &problem.zeta_at_points(&states[0].zeta));
     let corners =
         |(t, [i, j, k]): (usize, &[usize; 3])| format!("{i},{j},{k},{}", body.material(t));

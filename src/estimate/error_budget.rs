@@ -55,7 +55,7 @@ fn relative_to_damage(problem: &DiscreteProblem, field: &[f64], state: &State) -
 fn displacement_error_of(problem: &DiscreteProblem, error: &[f64], state: &State) -> f64 {
     let body = &problem.body;
     let (zeta, error) = (problem.zeta_at_points(&state.zeta), body.at_points(error));
-    let energies = problem.terms.elasticity.energies(body, &zeta, &state.u);
+    let energies = problem.elasticity.energies(body, &zeta, &state.u);
     let own = energies.len() / body.triangles.len() * body.own_triangles;
     let mut sums = [0.0; 2];
     for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {

@@ -81,7 +81,7 @@ fn energy_error(problem: &DiscreteProblem, outcome: &Outcome) -> Result<f64, Pet
     let state = representative(outcome);
     let (body, u) = (&problem.body, &problem.strained(state).u);
     let (recovered, zeta) = (RecoveredStrains::new(body, u)?, problem.zeta_at_points(&state.zeta));
-    Ok(recovered.energy_error(&problem.terms, &zeta, u).relative())
+    Ok(recovered.energy_error(&problem.elasticity, &zeta, u).relative())
 }
 
 impl Outcome {

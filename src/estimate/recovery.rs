@@ -1,7 +1,7 @@
 //! Recovered strains, to estimate the discretisation error of displacements.
 
 use crate::{
-    fem::{Body, Fits, Terms},
+    fem::{Body, Elasticity, Fits},
     petsc::PetscError,
 };
 use nalgebra::{Matrix6, Matrix6x3, Vector3};
@@ -48,7 +48,7 @@ impl<'a> RecoveredStrains<'a> {
     }
 
     /// Estimates the error of u in the energy norm; `zeta` is ζ at the quadrature points. Collective.
-    pub fn energy_error(&self, terms: &Terms, zeta: &[f64], u: &[f64]) -> EnergyError {
+    pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
         let Self { body, per_triangle, .. } = *self;
         let square = |t: usize| {
             let own = per_triangle * t..per_triangle * (t + 1);
@@ -57,10 +57,10 @@ impl<'a> RecoveredStrains<'a> {
             let difference = self.difference(t).map(|strain| strain.transpose());
             let difference = Matrix6x3::from_rows(&difference);
             let products = difference.transpose() * mass() * difference;
-            mean * body.triangles[t].area() * terms.elasticity.d(body, t).dot(&products)
+            mean * body.triangles[t].area() * elasticity.d(body, t).dot(&products)
         };
         let squares: Vec<f64> = (0..body.own_triangles).map(square).collect();
-        let mut sums = [squares.iter().sum(), terms.energy(body, zeta, u)];
+        let mut sums = [squares.iter().sum(), elasticity.energy(body, zeta, u)];
         body.nodes.partition.comm().sum(&mut sums);
         EnergyError { squares, error: sums[0], energy: sums[1] }
     }

@@ -114,7 +114,7 @@ impl<'a> ContactStep<'a> {
         let (body, constraints) = (&problem.body, &problem.constraints);
         let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
         let stiffness = phases.time("stiffness pattern", || {
-            Stiffness::new(session, body, &problem.terms, &constraints.bases)
+            Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
         let options = &problem.scene().contact;
         let bounded = comm.any(!constraints.bounds.is_empty());

@@ -1,14 +1,16 @@
-//! The damaged elasticity (ζ Aε(u), ε(v)) of (26): strains and stresses, and the term of K.
+//! The damaged elasticity a(u, v) = (ζ Aε(u), ε(v)) of (26): stresses, internal forces and energies.
 
 use super::{
     Body, Element, for_elements,
-    stiffness::Groups,
-    terms::{ElementSums, Term},
+    stiffness::{ElementSums, Groups},
 };
 use crate::model::Material;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Stresses, internal forces and energies of a displacement field, triangle by triangle.
+/// Stresses, internal forces and energies of a displacement field, triangle by triangle. `zeta` are the values of ζ at the
+/// quadrature points, [`Body::at_points`].
+///
+/// Solvers use [`Self::sums`]. The certificate and the error estimates use the other methods, which share no code with it.
 #[derive(Debug, Clone, Default)]
 pub struct Elasticity {
     /// The materials by their numbers, and A of each as the matrix D of [`Material::stiffness`], Pa.
@@ -18,7 +20,7 @@ pub struct Elasticity {
 impl Elasticity {
     /// The operator of undamaged `materials`, at least one, as they are numbered in
     /// [`Body::materials`].
-    pub(super) fn new(materials: impl IntoIterator<Item = Material>) -> Self {
+    pub fn new(materials: impl IntoIterator<Item = Material>) -> Self {
         Self { materials: materials.into_iter().map(|m| (m, m.stiffness())).collect() }
     }
 
@@ -81,23 +83,20 @@ impl Elasticity {
             points.map(|((density, point), zeta)| point.weight * zeta * density).collect()
         })
     }
-}
 
-impl Term for Elasticity {
-    fn nodes<'a>(&'a self, body: &'a Body) -> (usize, &'a [usize]) {
-        for_elements!(body, cells => cells.flat_nodes())
-    }
-
-    fn sums(&self, body: &Body) -> Box<dyn ElementSums> {
+    /// The sums over the elements for solvers, with ζ = 0.
+    pub(super) fn sums(&self, body: &Body) -> Box<dyn ElementSums> {
         for_elements!(body, cells => Box::new(Groups::new(self, cells)))
     }
 
-    fn add_force(&self, body: &Body, zeta: &[f64], u: &[f64], force: &mut [f64]) {
+    /// The internal forces F_i = a(u, φ_i) of nodal u, N per metre of thickness.
+    pub fn internal_force(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
+        let mut force = vec![0.0; u.len()];
         for_elements!(body, cells => {
             let mut zeta = zeta.iter();
             for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
                 let (local, d) = (cells.gather(t, u), self.d(body, t));
-                let mut sums = cells.gather(t, force);
+                let mut sums = cells.gather(t, &force);
                 for (point, zeta) in element.points.iter().zip(&mut zeta) {
                     let stress = d * point.strain(&local) * *zeta;
                     for (sum, [fx, fy]) in sums.iter_mut().zip(point.force(&stress)) {
@@ -109,9 +108,13 @@ impl Term for Elasticity {
                 }
             }
         });
+        force
     }
 
-    fn add_force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64], rounding: &mut [f64]) {
+    /// The rounding error of these forces, ε_machine Σ |K_T||u| over the elements T of a node, N per metre of thickness
+    /// (Oettli and Prager, Numer. Math. 6, 1964).
+    pub(crate) fn force_rounding(&self, body: &Body, zeta: &[f64], u: &[f64]) -> Vec<f64> {
+        let mut rounding = vec![0.0; u.len()];
         for_elements!(body, cells => {
             let mut zeta = zeta.iter();
             for (t, (nodes, element)) in cells.nodes.iter().zip(cells.elements).enumerate() {
@@ -128,15 +131,13 @@ impl Term for Elasticity {
                 }
             }
         });
+        rounding
     }
 
-    fn energy(&self, body: &Body, zeta: &[f64], u: &[f64]) -> f64 {
+    /// a(u, u) on the elements that belong to this rank, twice their energy, N m per metre of thickness.
+    pub(crate) fn energy(&self, body: &Body, zeta: &[f64], u: &[f64]) -> f64 {
         let energies = self.energies(body, zeta, u);
         let own = energies.len() * body.own_triangles / body.triangles.len().max(1);
         energies[..own].iter().sum()
-    }
-
-    fn resists(&self) -> Vec<(usize, [f64; 2])> {
-        Vec::new()
     }
 }

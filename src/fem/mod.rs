@@ -1,7 +1,7 @@
 //! Continuous finite elements (22), (23), P1 for ζ and P1 or P2 for u: from laws to matrices and vectors.
 //!
 //! - [`Body`]: the nodes and elements of a mesh, and their division among ranks ([`Partition`], `Subdomain`);
-//! - [`Terms`]: the terms of K, each with its forces and its energy, as [`Elasticity`], which also has stresses;
+//! - [`Elasticity`]: stresses, internal forces and energies of a displacement field;
 //! - [`Stiffness`]: K(ζ) for solvers, by elements or by entries;
 //! - [`DamageSystem`] solves (28), and [`DamageCertificate`] checks the answer without its matrices.
 //!
@@ -16,7 +16,6 @@ mod cells;
 mod body;
 mod subdomain;
 mod nodal_bases;
-mod terms;
 mod elasticity;
 mod stiffness;
 mod rigid_motion;
@@ -44,5 +43,4 @@ pub(crate) use patches::{Fits, Patches};
 pub use rigid_motion::{RigidMotion, resultant};
 pub use stiffness::Stiffness;
 pub use subdomain::Subdomain;
-pub use terms::Terms;
 pub use triangle::Triangle;

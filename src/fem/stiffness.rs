@@ -2,16 +2,13 @@
 
 mod groups;
 
-use super::{
-    Body, NodalBases, Nodes, Terms,
-    terms::{ElementSums, Term},
-};
+use super::{Body, Elasticity, NodalBases, Nodes, for_elements};
 use crate::petsc::{Matrix, Operator, Pattern, PetscError, Session, Vector};
 pub(super) use groups::Groups;
 use nalgebra::Matrix2;
 use std::{cell::RefCell, iter::zip, rc::Rc};
 
-/// The stiffness matrix K, the sum of its [`Terms`], in the unknowns of [`NodalBases`].
+/// The stiffness matrix K of the [`Elasticity`], in the unknowns of [`NodalBases`].
 ///
 /// Products and the diagonal are sums over the elements. The entries are written where they are read: for
 /// factors and for preconditioners of PETSc.
@@ -25,7 +22,10 @@ pub struct Stiffness {
 
 /// K in the unknowns of nodal bases, from the elements.
 struct ElementOperator {
-    terms: Vec<TermOperator>,
+    sums: Box<dyn ElementSums>,
+    /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
+    /// `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
+    places: Vec<[u32; 2]>,
     nodes: Rc<Nodes>,
     bases: NodalBases,
     /// The diagonal entry of fixed unknowns.
@@ -34,12 +34,23 @@ struct ElementOperator {
     fixed: Vec<(u32, bool)>,
 }
 
-/// A term of K.
-struct TermOperator {
-    sums: Box<dyn ElementSums>,
-    /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
-    /// `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
-    places: Vec<[u32; 2]>,
+/// Sums over the elements, in displacements without nodal bases.
+pub(crate) trait ElementSums {
+    /// Takes ζ at the quadrature points.
+    fn set(&mut self, body: &Body, zeta: &[f64]);
+
+    /// Adds the internal forces of `u` to `force`.
+    fn add_forces(&self, u: &[f64], force: &mut [f64]);
+
+    /// Adds K_xx, K_xy and K_yy of each node with itself.
+    fn add_diagonal(&self, diagonal: &mut [[f64; 3]]);
+
+    /// Calls `add` for the pairs of nodes (i, j), j ≤ i, of every element: the numbers of (i, j) and of (j, i) among
+    /// all pairs, the nodes, and K_ij. Element e has the pairs N² e to N² (e + 1), row by row.
+    fn for_blocks(&self, add: &mut dyn FnMut([usize; 2], [usize; 2], Matrix2<f64>));
+
+    /// The memory of these data, bytes.
+    fn bytes(&self) -> usize;
 }
 
 /// The place of a row that is not stored.
@@ -48,14 +59,14 @@ const NOT_STORED: [u32; 2] = [u32::MAX; 2];
 const BLOCK_ENTRIES: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 
 impl Stiffness {
-    /// The elements of all terms and their pattern; the values are those of the undamaged body.
+    /// The elements and their pattern; the values are those of the undamaged body.
     ///
     /// # Errors
     /// PETSc failed.
     pub fn new(
         session: &Session,
         body: &Body,
-        terms: &Terms,
+        elasticity: &Elasticity,
         bases: &NodalBases,
     ) -> Result<Self, PetscError> {
         let (partition, fixed) = (&body.nodes.partition, bases.fixed());
@@ -63,8 +74,8 @@ impl Stiffness {
         let is_stored =
             |a: usize, b: usize| a < partition.owned() && (a == b || !is_fixed(a) && !is_fixed(b));
         let column = |node: usize| partition.global(node, 1, 0);
-        let all = terms.all().flat_map(|term| couples(term.nodes(body)));
-        let stored = all.filter(|&(a, b)| is_stored(a, b)).map(|(a, b)| (a, column(b)));
+        let couples = for_elements!(body, cells => couples(cells.flat_nodes()));
+        let stored = couples.clone().filter(|&(a, b)| is_stored(a, b)).map(|(a, b)| (a, column(b)));
         let pattern = Pattern::new(partition.owned(), stored);
         let (mut matrix, entries) = Matrix::with_places(session, 2, &pattern.of_blocks())?;
         matrix.set_near_null_space(rigid_motions(session, body, bases)?)?;
@@ -84,16 +95,13 @@ impl Stiffness {
             }
             rows
         };
-        let of_term = |term: &dyn Term| TermOperator {
-            sums: term.sums(body),
-            places: couples(term.nodes(body)).map(&mut place).collect(),
-        };
-        let of_terms = terms.all().map(of_term).collect();
+        let places = couples.map(&mut place).collect();
         of_fixed.sort_unstable();
         of_fixed.dedup();
 
         let mut operator = ElementOperator {
-            terms: of_terms,
+            sums: elasticity.sums(body),
+            places,
             nodes: Rc::clone(&body.nodes),
             bases: bases.clone(),
             scale: 0.0,
@@ -101,7 +109,7 @@ impl Stiffness {
         };
         operator.set_damage(body, &body.at_points(&vec![1.0; body.mesh.nodes.len()]));
         operator.scale = operator.mean_diagonal().unwrap_or_else(|| {
-            terms.elasticity.materials().map(|material| material.young).fold(0.0, f64::max)
+            elasticity.materials().map(|material| material.young).fold(0.0, f64::max)
         });
         let (scale, operator) = (operator.scale, Rc::new(RefCell::new(operator)));
         matrix.set_operator(Rc::clone(&operator) as Rc<dyn Operator>)?;
@@ -123,13 +131,13 @@ impl Stiffness {
 
 impl ElementOperator {
     fn set_damage(&mut self, body: &Body, zeta: &[f64]) {
-        self.terms.iter_mut().for_each(|term| term.sums.set(body, zeta));
+        self.sums.set(body, zeta);
     }
 
     /// The diagonal entries of the owned unknowns; D⁻ᵀ K_ii D⁻¹ with the bases D.
     fn diagonal(&self) -> Vec<f64> {
         let mut blocks = vec![[0.0; 3]; self.nodes.points.len()];
-        self.terms.iter().for_each(|term| term.sums.add_diagonal(&mut blocks));
+        self.sums.add_diagonal(&mut blocks);
         let of_node = |(node, [xx, xy, yy]): (usize, [f64; 3])| match self.bases.inverse(node) {
             None => [xx, yy],
             Some(inverse) => {
@@ -156,13 +164,13 @@ impl ElementOperator {
 
 impl Operator for RefCell<ElementOperator> {
     fn multiply(&self, x: &[f64], y: &mut [f64]) -> Result<(), PetscError> {
-        let ElementOperator { terms, nodes, bases, scale, .. } = &*self.borrow();
+        let ElementOperator { sums, nodes, bases, scale, .. } = &*self.borrow();
         let mut u = x.to_vec();
         bases.zero_fixed(&mut u);
         let mut u = nodes.partition.field(u, 2)?;
         bases.displacement_to_global(&mut u);
         let mut force = vec![0.0; u.len()];
-        terms.iter().for_each(|term| term.sums.add_forces(&u, &mut force));
+        sums.add_forces(&u, &mut force);
         bases.force_to_local(&mut force);
         y.copy_from_slice(&force[..y.len()]);
         let fixed = zip(zip(y, x), bases.fixed()).filter(|(_, fixed)| **fixed);
@@ -175,27 +183,24 @@ impl Operator for RefCell<ElementOperator> {
     }
 
     fn write(&self, entries: &mut [f64]) {
-        let ElementOperator { terms, bases, scale, fixed, .. } = &*self.borrow();
-        for TermOperator { sums, places } in terms {
-            sums.for_blocks(&mut |[upper, lower], nodes, mut block| {
-                let [of_i, of_j] = nodes.map(|node| bases.inverse(node));
-                block = of_i.map_or(block, |inverse| inverse.transpose() * block);
-                block = of_j.map_or(block, |inverse| block * inverse);
-                add(entries, places[upper], &block);
-                if upper != lower {
-                    add(entries, places[lower], &block.transpose());
-                }
-            });
-        }
+        let ElementOperator { sums, places, bases, scale, fixed, .. } = &*self.borrow();
+        sums.for_blocks(&mut |[upper, lower], nodes, mut block| {
+            let [of_i, of_j] = nodes.map(|node| bases.inverse(node));
+            block = of_i.map_or(block, |inverse| inverse.transpose() * block);
+            block = of_j.map_or(block, |inverse| block * inverse);
+            add(entries, places[upper], &block);
+            if upper != lower {
+                add(entries, places[lower], &block.transpose());
+            }
+        });
         fixed.iter().for_each(|&(place, on_diagonal)| {
             entries[place as usize] = if on_diagonal { *scale } else { 0.0 };
         });
     }
 
     fn bytes(&self) -> f64 {
-        let ElementOperator { terms, nodes, .. } = &*self.borrow();
-        (terms.iter().map(|term| term.sums.bytes()).sum::<usize>()
-            + 4 * size_of_val(&nodes.points[..])) as f64
+        let ElementOperator { sums, nodes, .. } = &*self.borrow();
+        (sums.bytes() + 4 * size_of_val(&nodes.points[..])) as f64
     }
 }
 

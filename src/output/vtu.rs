@@ -247,7 +247,7 @@ fn stress_data(stresses: &[[f64; 4]]) -> [DataArray; 4] {
 /// The mean stress of each triangle, xx, yy, xy, as the finite elements have it. If there are several materials,
 /// each triangle has a number: 0, or 1, 2, … for the surfaces of the scene by name.
 fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
-    let (elasticity, body) = (&problem.terms.elasticity, &problem.body);
+    let (elasticity, body) = (&problem.elasticity, &problem.body);
     let zeta = problem.zeta_at_points(&state.zeta);
     let stress = elasticity.stresses(body, &zeta, &state.u);
     let components = stress[..body.own_triangles].iter().flat_map(|s| [s[0], s[1], s[2]]);

@@ -4,7 +4,7 @@ use super::loads::SurfaceForce;
 use crate::{
     ROUNDING,
     contact::{NodalConstraint, RigidMotions},
-    fem::{Body, Terms, normal_error},
+    fem::{Body, Elasticity, normal_error},
     mesh::{BoundaryFace, Lines, extent, joined_faces},
     scene::{Condition, Expression, Gap, Scene},
 };
@@ -20,8 +20,8 @@ pub(super) struct BoundaryConditions {
     /// boundary among them.
     pub(super) supports: Vec<String>,
     pub(super) prescribed_by: Vec<usize>,
-    /// The terms of K.
-    pub(super) terms: Terms,
+    /// The elasticity of the materials.
+    pub(super) elasticity: Elasticity,
     /// The surface loads of Γ_N.
     pub(super) surface_forces: Vec<SurfaceForce>,
     /// Per node: the largest possible angle between the mesh normal and the exact normal, rad.
@@ -54,8 +54,9 @@ impl BoundaryConditions {
     /// The conditions of `scene` on `body`, whose mesh has all curves that the scene names, and whose boundary is `lines`.
     pub(super) fn new(scene: &Scene, body: &Body, lines: &Lines) -> Self {
         let (mesh, points) = (&body.mesh, &body.nodes.points);
-        let (terms, normal_errors) = (Terms::new(scene.materials()), vec![0.0; points.len()]);
-        let mut conditions = Self { terms, normal_errors, ..Self::default() };
+        let elasticity = Elasticity::new(scene.materials());
+        let normal_errors = vec![0.0; points.len()];
+        let mut conditions = Self { elasticity, normal_errors, ..Self::default() };
         let mut gaps = Vec::new();
         // A smaller constant gap counts as zero: nodes of curves and differences like `0.3-0.1*3` are rounded.
         let rounding = ROUNDING * extent(points);
@@ -121,7 +122,7 @@ impl BoundaryConditions {
     /// Finds the rigid motions that the conditions do not prevent. If the normal of an axis or a gap is orthogonal
     /// to a free motion up to rounding, it becomes exactly orthogonal.
     pub(super) fn resolve_motions(&mut self, body: &Body) -> RigidMotions {
-        let motions = RigidMotions::new(body, &self.terms, &self.rows, &self.normal_errors);
+        let motions = RigidMotions::new(body, &self.rows, &self.normal_errors);
         let rows = self.rows.iter_mut().zip(&self.values);
         for (row, _) in rows.filter(|(row, value)| row.is_gap() || value.of.is_empty()) {
             row.direction =

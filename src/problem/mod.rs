@@ -51,7 +51,7 @@ pub(crate) use unresolved::unresolved;
 use crate::{
     ROUNDING,
     contact::{Bound, Certificate, Constraints, RigidMotions},
-    fem::{Body, Mass, Subdomain, Terms},
+    fem::{Body, Elasticity, Mass, Subdomain},
     mesh::{Lines, Mesh},
     model::DamageLaw,
     petsc::{PetscError, Session},
@@ -70,8 +70,8 @@ use std::{
 pub struct DiscreteProblem {
     /// The body.
     pub body: Body,
-    /// The terms of K.
-    pub terms: Terms,
+    /// The elasticity of the materials.
+    pub elasticity: Elasticity,
     /// The damage law of each material, by its number; empty if the damage does not evolve.
     laws: Vec<DamageLaw>,
     /// Displacement conditions as unknowns and bounds, for the solvers.
@@ -158,7 +158,7 @@ impl DiscreteProblem {
             has_chords,
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
-            terms: conditions.terms,
+            elasticity: conditions.elasticity,
             laws: if scene.time.is_some() { scene.damage_laws() } else { Vec::new() },
             constraints,
             motions,
@@ -188,7 +188,6 @@ impl DiscreteProblem {
         let Some(owners) = Subdomain::owners(session, &self.body.mesh)? else { return Ok(self) };
         let subdomain = Subdomain::new(session, &self.body, &owners)?;
         Ok(Self {
-            terms: self.terms.restrict(&subdomain),
             constraints: self.constraints.restrict(&subdomain),
             certificate: self.certificate.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),

@@ -72,7 +72,7 @@ impl NodalStress {
                 }
             }
         }
-        let materials = problem.terms.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
+        let materials = problem.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
         Self { patches: Arc::clone(body.patches()), points, cells, materials }
     }
 

@@ -45,7 +45,7 @@ impl Probes {
     /// u_x, u_y, m, ζ, σ_xx, σ_yy, σ_xy and the von Mises stress, Pa, at each probe; 0 at probes of other ranks. The stress is σ = η_*(ζ) 𝒜ε(u) at the point, with the mean
     /// strain of its triangles.
     pub(super) fn values(&self, problem: &DiscreteProblem, state: &State) -> Vec<[f64; 7]> {
-        let (elasticity, body) = (&problem.terms.elasticity, &problem.body);
+        let (elasticity, body) = (&problem.elasticity, &problem.body);
         let values = |(locations, triangles): &(Vec<Location>, Option<Vec<usize>>)| {
             let Some(triangles) = triangles else { return [0.0; 7] };
             let values = locations.iter().zip(triangles);

@@ -18,7 +18,7 @@ fn lshape(step: &str, sets: &[&str]) -> DiscreteProblem {
 /// ½ uᵀKu − fᵀu and Ku − f at the state.
 fn energy(problem: &DiscreteProblem, state: &State, u: &[f64]) -> (f64, Vec<f64>) {
     let internal =
-        problem.terms.internal_force(&problem.body, &problem.zeta_at_points(&state.zeta), u);
+        problem.elasticity.internal_force(&problem.body, &problem.zeta_at_points(&state.zeta), u);
     let load = problem.loads.at(&problem.body, state.time);
     let energy = (0..u.len()).map(|i| (0.5 * internal[i] - load[i]) * u[i]).sum();
     (energy, internal.iter().zip(&load).map(|(r, f)| r - f).collect())

@@ -7,7 +7,7 @@ use crate::support::{
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SVector, Vector3};
 use signorini::{
     fem::{
-        Body, DamageSystem, Element, Mass, NodalBases, Stiffness, Terms, Triangle, source,
+        Body, DamageSystem, Elasticity, Element, Mass, NodalBases, Stiffness, Triangle, source,
         source_load,
     },
     mesh::Order,
@@ -23,8 +23,8 @@ pub fn material(plane: Plane) -> Material {
     Material { young: YOUNG, poisson: POISSON, plane, density: 0.0 }
 }
 
-fn terms(plane: Plane) -> Terms {
-    Terms::new([material(plane)])
+fn elasticity(plane: Plane) -> Elasticity {
+    Elasticity::new([material(plane)])
 }
 
 /// Counter-clockwise triangles of all shapes that are not too thin.
@@ -108,12 +108,12 @@ fn rigid_motions_have_neither_strain_nor_force() {
         let body = Body::new(unstructured(0.2), order);
         let zeta: Vec<f64> =
             Random::new(4).field(3 * body.triangles.len()).iter().map(|z| 1.5 + z).collect();
-        let terms = terms(Plane::Strain);
+        let elasticity = elasticity(Plane::Strain);
         // u = a + θ e_z × x
         let u: Vec<f64> =
             body.nodes.points.iter().flat_map(|[x, y]| [0.3 - 0.7 * y, -1.1 + 0.7 * x]).collect();
         assert!(body.strains(&u).iter().all(|strain| strain.amax() < 1e-13));
-        assert!(largest(&terms.internal_force(&body, &zeta, &u)) < 1e-12 * YOUNG);
+        assert!(largest(&elasticity.internal_force(&body, &zeta, &u)) < 1e-12 * YOUNG);
         // u = (a x + γ y, 0): ε_xx = a, 2ε_xy = γ.
         let strained: Vec<f64> =
             body.nodes.points.iter().flat_map(|[x, y]| [x + 0.4 * y, 0.0]).collect();
@@ -129,14 +129,15 @@ fn forces_turn_with_the_body() {
     let mut random = Random::new(6);
     let turned =
         |v: &[f64]| -> Vec<f64> { v.chunks(2).flat_map(|v| turn(angle, [v[0], v[1]])).collect() };
-    let terms = terms(Plane::Stress);
+    let elasticity = elasticity(Plane::Stress);
     for order in ORDERS {
         let body = Body::new(mesh.clone(), order);
         let zeta: Vec<f64> = (0..3 * body.triangles.len()).map(|_| 1.5 + random.next()).collect();
         let u = random.field(2 * body.nodes.points.len());
-        let force = terms.internal_force(&body, &zeta, &u);
+        let force = elasticity.internal_force(&body, &zeta, &u);
         let body = Body::new(moved(mesh.clone(), |x| turn(angle, x)), order);
-        let error = difference(&terms.internal_force(&body, &zeta, &turned(&u)), &turned(&force));
+        let error =
+            difference(&elasticity.internal_force(&body, &zeta, &turned(&u)), &turned(&force));
         assert!(error < 1e-13, "{error}");
     }
 }
@@ -176,13 +177,13 @@ fn nodal_bases_keep_work_and_give_back_what_they_take() {
 #[test]
 fn the_stiffness_is_the_internal_force_in_the_nodal_bases() {
     let (mesh, session) = (unstructured(0.2), Session::start(&[]).unwrap());
-    let terms = terms(Plane::Stress);
+    let elasticity = elasticity(Plane::Stress);
     for order in ORDERS {
         let body = Body::new(mesh.clone(), order);
         let nodes = body.nodes.points.len();
         let mut random = Random::new(8);
         let bases = bases(nodes, &mut random);
-        let mut stiffness = Stiffness::new(&session, &body, &terms, &bases).unwrap();
+        let mut stiffness = Stiffness::new(&session, &body, &elasticity, &bases).unwrap();
         for _ in 0..3 {
             let zeta: Vec<f64> = body.mesh.nodes.iter().map(|_| 1.5 + random.next()).collect();
             let zeta = body.at_points(&zeta);
@@ -197,7 +198,7 @@ fn the_stiffness_is_the_internal_force_in_the_nodal_bases() {
             // K c = D⁻ᵀ F(D⁻¹ c) on the free unknowns, and the fixed are decoupled from them.
             let mut u = c.clone();
             bases.displacement_to_global(&mut u);
-            let mut force = terms.internal_force(&body, &zeta, &u);
+            let mut force = elasticity.internal_force(&body, &zeta, &u);
             bases.force_to_local(&mut force);
             force.iter_mut().zip(fixed).for_each(|(f, fixed)| *f = if *fixed { 0.0 } else { *f });
             let error = difference(&product, &force);

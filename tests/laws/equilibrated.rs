@@ -18,7 +18,7 @@ use std::collections::HashMap;
 /// ‖v‖² of nodal v.
 fn square_norm(problem: &DiscreteProblem, zeta: &[f64], v: &[f64]) -> f64 {
     let zeta = problem.zeta_at_points(zeta);
-    problem.terms.elasticity.energies(&problem.body, &zeta, v).iter().sum()
+    problem.elasticity.energies(&problem.body, &zeta, v).iter().sum()
 }
 
 /// The true error of a state, relative, in the energy norm.

@@ -75,7 +75,7 @@ fn answer(size: f64, degree: u8) -> [f64; 4] {
     let outcome = run(&problem, SOLVERS[0]);
     let (body, state) = (&problem.body, &outcome.last.state);
     let zeta = problem.zeta_at_points(&state.zeta);
-    let energies: f64 = problem.terms.elasticity.energies(body, &zeta, &state.u).iter().sum();
+    let energies: f64 = problem.elasticity.energies(body, &zeta, &state.u).iter().sum();
     let load = problem.loads.at(body, 1.0);
     let work: f64 = load.iter().zip(&state.u).map(|(f, u)| f * u).sum();
 

@@ -7,7 +7,7 @@ use crate::support::{
 use signorini::{
     contact::SOLVERS,
     evolution::DiscreteProblem,
-    fem::{Body, Edge, Terms, TriangleParts, add_body_force, add_traction, parabola},
+    fem::{Body, Edge, Elasticity, TriangleParts, add_body_force, add_traction, parabola},
     mesh::{Mesh, Order},
     model::{Material, Plane},
 };
@@ -129,14 +129,18 @@ fn a_pressure_on_a_curved_boundary_has_the_resultant_and_moment_of_its_ends() {
 fn a_uniform_stress_is_in_equilibrium_with_its_traction_on_curved_elements() {
     // u = (ax + by, cx + dy): ∫σ : ε(φ_i) = ∫_∂Ω σν·φ_i, to round-off by both quadratures.
     let body = Body::new(curved(), Order::Quadratic);
-    let terms =
-        Terms::new([Material { young: 3.0, poisson: 0.3, plane: Plane::Strain, density: 0.0 }]);
+    let elasticity = Elasticity::new([Material {
+        young: 3.0,
+        poisson: 0.3,
+        plane: Plane::Strain,
+        density: 0.0,
+    }]);
     let u: Vec<f64> = (body.nodes.points.iter())
         .flat_map(|[x, y]| [0.2 * x + 0.7 * y, 0.1 * x - 0.4 * y])
         .collect();
     let ones = vec![1.0; 3 * body.triangles.len()];
-    let force = terms.internal_force(&body, &ones, &u);
-    let stress = terms.elasticity.stresses(&body, &ones, &u)[0];
+    let force = elasticity.internal_force(&body, &ones, &u);
+    let stress = elasticity.stresses(&body, &ones, &u)[0];
     let mut load = vec![0.0; u.len()];
     for curve in body.mesh.curves.values() {
         let traction = |_, [nx, ny]: [f64; 2]| {

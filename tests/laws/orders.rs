@@ -144,7 +144,7 @@ fn check(meshes: [Mesh; 3], plane: &str, d: f64, degree: u8) {
         let errors = errors(&problem, &state.u, d);
         let recovered = RecoveredStrains::new(&problem.body, &state.u).unwrap();
         let zeta = problem.zeta_at_points(&state.zeta);
-        let estimate = recovered.energy_error(&problem.terms, &zeta, &state.u);
+        let estimate = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
         let ratio = estimate.error.sqrt() / errors[2];
         println!("estimated over true: {ratio:.3}");
         assert!((0.7..1.4).contains(&ratio), "{ratio} of {}", errors[2]);

@@ -10,7 +10,7 @@ use crate::{
 };
 use nalgebra::{Matrix2, Vector3};
 use signorini::{
-    fem::{Body, Element, Elements, Mass, Terms, source, source_load},
+    fem::{Body, Elasticity, Element, Elements, Mass, source, source_load},
     mesh::Order,
     model::{Fremond, Material, Plane},
 };
@@ -142,16 +142,16 @@ fn internal_forces_are_the_gradient_of_the_energy() {
         (distorted(4), Order::Quadratic, Plane::Stress),
         (curved(), Order::Quadratic, Plane::Strain),
     ] {
-        let (terms, body) = (Terms::new([material(plane)]), Body::new(mesh, order));
+        let (elasticity, body) = (Elasticity::new([material(plane)]), Body::new(mesh, order));
         let points = if order == Order::Linear { 1 } else { 3 };
         let zeta = random.field(points * body.triangles.len());
         let zeta: Vec<f64> = zeta.iter().map(|z| 1.5 + z).collect();
         let u = random.field(2 * body.nodes.points.len());
-        let force = terms.internal_force(&body, &zeta, &u);
+        let force = elasticity.internal_force(&body, &zeta, &u);
         // Twice the energy is u·F, and central differences of a quadratic are exact.
         let work: f64 = force.iter().zip(&u).map(|(f, u)| f * u).sum();
         close(work / (2.0 * energy(&body, plane, &zeta, &u)), 1.0, 1e-12);
-        let energies: f64 = terms.elasticity.energies(&body, &zeta, &u).iter().sum();
+        let energies: f64 = elasticity.energies(&body, &zeta, &u).iter().sum();
         close(energies / work, 1.0, 1e-12);
         for _ in 0..5 {
             let v = random.field(u.len());
@@ -197,12 +197,13 @@ fn the_damage_source_is_taken_at_the_quadrature_points() {
 fn the_stress_of_a_curved_triangle_is_its_mean() {
     // ∫ ε(u) = ∮ (u ⊗ n + n ⊗ u)/2 ds: along a parabola u and x are quadratic, so Simpson's rule is exact.
     let mesh = bent(&square(2), |[x, y]| [x + 0.2 * y * y, y + 0.15 * x * (1.0 - x)]);
-    let (body, terms) = (Body::new(mesh, Order::Quadratic), Terms::new([material(Plane::Stress)]));
+    let (body, elasticity) =
+        (Body::new(mesh, Order::Quadratic), Elasticity::new([material(Plane::Stress)]));
     let mut random = Random::new(5);
     let points = &body.nodes.points;
     let u: Vec<f64> = (0..2 * points.len()).map(|_| random.next()).collect();
     let zeta = body.at_points(&vec![1.0; body.mesh.nodes.len()]);
-    let stresses = terms.elasticity.stresses(&body, &zeta, &u);
+    let stresses = elasticity.stresses(&body, &zeta, &u);
     for (stress, &[a, b, c]) in stresses.iter().zip(&body.mesh.triangles) {
         let (mut area, mut strain) = (0.0, Vector3::zeros());
         for edge in body.edges(&[[a, b], [b, c], [c, a]]) {

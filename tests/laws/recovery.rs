@@ -4,7 +4,7 @@ use crate::support::{ORDERS, distorted, layered, problem, run, square, unstructu
 use signorini::{
     contact::SOLVERS,
     estimate::RecoveredStrains,
-    fem::{Body, Terms},
+    fem::{Body, Elasticity},
     mesh::{Mesh, Order},
     model::{Material, Plane},
 };
@@ -22,8 +22,12 @@ fn displacement(order: Order, [x, y]: [f64; 2]) -> [f64; 2] {
 
 #[test]
 fn strains_of_the_degree_of_the_element_are_recovered_exactly_up_to_the_boundary() {
-    let terms =
-        Terms::new([Material { young: 1.0, poisson: 0.3, plane: Plane::Stress, density: 0.0 }]);
+    let elasticity = Elasticity::new([Material {
+        young: 1.0,
+        poisson: 0.3,
+        plane: Plane::Stress,
+        density: 0.0,
+    }]);
     // One cell has two triangles: no vertex has enough of them.
     for mesh in [square(1), square(2), distorted(2), distorted(6), unstructured(0.2)] {
         for order in ORDERS {
@@ -32,7 +36,7 @@ fn strains_of_the_degree_of_the_element_are_recovered_exactly_up_to_the_boundary
                 body.nodes.points.iter().flat_map(|&x| displacement(order, x)).collect();
             let recovered = RecoveredStrains::new(&body, &u).unwrap();
             let zeta = vec![1.0; 3 * body.triangles.len()];
-            let error = recovered.energy_error(&terms, &zeta, &u);
+            let error = recovered.energy_error(&elasticity, &zeta, &u);
             let relative = error.relative();
             assert!(relative < 1e-9, "{} triangles: {relative:.1e}", body.triangles.len());
         }

@@ -165,7 +165,7 @@ fn contact_and_clamp_together_carry_the_load_of_the_lshape() {
         for (_, outcome) in agreed("lshape", &problem) {
             let state = outcome.last.state;
             let zeta = problem.zeta_at_points(&state.zeta);
-            let internal = problem.terms.internal_force(&problem.body, &zeta, &state.u);
+            let internal = problem.elasticity.internal_force(&problem.body, &zeta, &state.u);
             let load = problem.loads.at(&problem.body, state.time);
             let reaction =
                 |k: usize| clamp.iter().map(|i| internal[2 * i + k] - load[2 * i + k]).sum::<f64>();

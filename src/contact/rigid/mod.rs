@@ -1,5 +1,4 @@
-//! The rigid motions that prescribed displacements and the terms of K allow: the null space of K. Contact constrains some of
-//! them.
+//! The rigid motions that prescribed displacements allow: the null space of K. Contact constrains some of them.
 
 mod least;
 mod load;
@@ -12,10 +11,10 @@ pub use nonnegative::nonnegative;
 pub(crate) use until_contact::{rigid_motion_until_contact, unconstrained_motions};
 
 use super::{Bound, Constraints, NodalConstraint};
-use crate::fem::{Body, RigidMotion, Terms, resultant};
+use crate::fem::{Body, RigidMotion, resultant};
 use nalgebra::{DMatrix, DVector};
 
-/// The rigid motions that prescribed displacements and the terms of K allow, orthonormal with respect to ∫u·v/|Ω|.
+/// The rigid motions that prescribed displacements allow, orthonormal with respect to ∫u·v/|Ω|.
 #[derive(Debug, Clone)]
 pub struct RigidMotions {
     /// Free motions: contact constrains them in neither sense.
@@ -37,25 +36,19 @@ const UNRESISTED: f64 = 1e-9;
 const PREVENTED: f64 = 1e-14;
 
 impl RigidMotions {
-    /// From the rows of a body, with joined gap conditions, and its terms of K. `normal_errors` bounds the angle between the
+    /// From the rows of a body, with joined gap conditions. `normal_errors` bounds the angle between the
     /// normals of mesh and geometry at each node, rad. A motion u along a curved boundary is free although
     /// |u·ν| may be this angle times |u|.
     ///
-    /// Prescribed displacements and terms that resist rigid motions are rows r·v = 0 for the coordinates v of a motion
+    /// Prescribed displacements are rows r·v = 0 for the coordinates v of a motion
     /// ([`RigidMotion::new`]). They allow the null space of Σ r rᵀ. The free motions in it are also in the null space of u·ν at the
     /// gap conditions.
-    pub fn new(
-        body: &Body,
-        terms: &Terms,
-        rows: &[NodalConstraint],
-        normal_errors: &[f64],
-    ) -> Self {
+    pub fn new(body: &Body, rows: &[NodalConstraint], normal_errors: &[f64]) -> Self {
         let points = &body.nodes.points;
         let ([cx, cy], radius) = (body.centroid, body.radius_of_gyration());
         let mut gram = DMatrix::zeros(3, 3);
         let of = |row: &NodalConstraint| (row.node, row.direction);
-        let axes = rows.iter().filter(|row| !row.is_gap()).map(of);
-        let axes: Vec<_> = axes.chain(terms.resist()).collect();
+        let axes: Vec<_> = rows.iter().filter(|row| !row.is_gap()).map(of).collect();
         let normals: Vec<_> = rows.iter().filter(|row| row.is_gap()).map(of).collect();
         for &(node, d) in &axes {
             let [x, y] = points[node];

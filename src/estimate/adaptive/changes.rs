@@ -48,7 +48,7 @@ pub(super) fn displacement(
 ) -> f64 {
     let (before, after, size) = (coarse.strains(), fine.strains(), fine.energy());
     let (problem, comm) = (fine.problem, fine.problem.body.nodes.partition.comm());
-    let (body, elasticity) = (&problem.body, &problem.terms.elasticity);
+    let (body, elasticity) = (&problem.body, &problem.elasticity);
     let zeta = problem.zeta_at_points(&fine.outcome.last.state.zeta);
     let per_triangle = zeta.len() / body.triangles.len();
     let square = |t: usize| {

@@ -211,7 +211,7 @@ impl History {
         let zeta = problem.zeta_at_points(&state.zeta);
         let state = &problem.strained(state);
         let recovered = RecoveredStrains::new(body, &state.u)?;
-        let error = recovered.energy_error(&problem.terms, &zeta, &state.u);
+        let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
         let squares = gathered(problem, &error.squares, self.squares.len());
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
         self.end = (squares, error.error, error.energy);

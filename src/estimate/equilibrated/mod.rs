@@ -116,10 +116,10 @@ impl<'a> EquilibratedStress<'a> {
         state: &State,
     ) -> Result<Result<Self, Unproved>, PetscError> {
         let problem = contact_step.problem();
-        let (body, terms) = (&problem.body, &problem.terms);
+        let (body, elasticity) = (&problem.body, &problem.elasticity);
         let (partition, points) = (&body.nodes.partition, problem.zeta_at_points(&state.zeta));
         let comm = partition.comm();
-        let norm = |u: &[f64]| comm.total(terms.energy(body, &points, u)).max(0.0).sqrt();
+        let norm = |u: &[f64]| comm.total(elasticity.energy(body, &points, u)).max(0.0).sqrt();
         let size = norm(&problem.strained(state).u);
         if comm.any(is_curved(body)) {
             return Ok(Err("sides are curved"));
@@ -150,7 +150,7 @@ impl<'a> EquilibratedStress<'a> {
         let admitted: Vec<f64> = state.u.iter().zip(&moved).map(|(u, v)| u + v).collect();
         // The correction w.
         let contact = pressure::nodal_forces(problem, &edges);
-        let internal = terms.internal_force(body, &points, &state.u);
+        let internal = elasticity.internal_force(body, &points, &state.u);
         let rest = load.iter().zip(&contact).zip(&internal).map(|((f, p), k)| f + p - k).collect();
         let held = contact_step.holding();
         let forces = partition.norm(&internal, 2).max(partition.norm(&load, 2));
@@ -260,7 +260,7 @@ impl<'a> EquilibratedStress<'a> {
         let per_triangle = self.strains.len() / self.triangles.len();
         LoadedTriangle {
             frame: Frame::new(triangle.corners),
-            d: problem.terms.elasticity.d(&problem.body, t),
+            d: problem.elasticity.d(&problem.body, t),
             strains: at_vertices(&self.strains[per_triangle * t..per_triangle * (t + 1)]),
             zeta: problem.body.mesh.triangles[t].map(|vertex| self.zeta[vertex]),
             sides: &self.tractions[t],
@@ -305,7 +305,7 @@ fn stressed(
     u: &[f64],
     loads: &ElementLoads,
 ) -> Vec<StressedTriangle> {
-    let (body, elasticity) = (&problem.body, &problem.terms.elasticity);
+    let (body, elasticity) = (&problem.body, &problem.elasticity);
     let strains = body.strains(u);
     let per_triangle = strains.len() / body.triangles.len();
     let vertices = body.node_of_vertex();

@@ -100,7 +100,7 @@ impl<'a> ContactStep<'a> {
             return Ok(accuracy);
         }
         let zeta = problem.zeta_at_points(&state.zeta);
-        let internal = problem.terms.internal_force(body, &zeta, &state.u);
+        let internal = problem.elasticity.internal_force(body, &zeta, &state.u);
         let mut forces = problem.motions.balanced(body, problem.load(state.time));
         forces.iter_mut().zip(&internal).for_each(|(f, r)| *f -= r);
         let flags = active_bounds(constraints, &state.contact, 0.0);

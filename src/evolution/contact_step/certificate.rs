@@ -46,14 +46,14 @@ impl Candidate {
 }
 
 impl ContactStep<'_> {
-    /// The KKT residuals of u, measured from the reference. Forces are summed over the [`Terms`](crate::fem::Terms) of
-    /// K by their own code, not by the operator of the solvers.
+    /// The KKT residuals of u, measured from the reference. Forces are summed by the code of
+    /// [`Elasticity`](crate::fem::Elasticity), not by the operator of the solvers.
     pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Candidate {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let rigid = RigidMotion::nearest(body, &u);
         let [rigid_max, elastic_max] = rigid.max_norms(body, &u);
-        let mut unbalanced = problem.terms.internal_force(body, &self.zeta_at_points, &u);
+        let mut unbalanced = problem.elasticity.internal_force(body, &self.zeta_at_points, &u);
         // |f|², |Ku|², u·Ku, |u|², Σ|f| and Σ|Ku|.
         let mut sums = [0.0; 6];
         let nodal = unbalanced.iter_mut().zip(&case.load).zip(&u);
@@ -152,8 +152,8 @@ impl ContactStep<'_> {
     /// The rounding of the internal forces of u, ε_machine ‖|K||u|‖₂ / F.
     fn rounding(&self, candidate: &Candidate) -> f64 {
         let body = &self.problem.body;
-        let terms = &self.problem.terms;
-        let rounding = terms.force_rounding(body, &self.zeta_at_points, &candidate.u);
+        let elasticity = &self.problem.elasticity;
+        let rounding = elasticity.force_rounding(body, &self.zeta_at_points, &candidate.u);
         body.nodes.partition.norm(&rounding, 2) / candidate.scales.force
     }
 }

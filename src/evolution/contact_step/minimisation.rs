@@ -78,7 +78,7 @@ impl ContactStep<'_> {
         let partition = &body.nodes.partition;
         let internal_force = |mut u: Vec<f64>| {
             self.problem.constraints.bases.displacement_to_global(&mut u);
-            self.problem.terms.internal_force(body, &self.zeta_at_points, &u)
+            self.problem.elasticity.internal_force(body, &self.zeta_at_points, &u)
         };
         let (mut load, mut scale) = (load.to_vec(), partition.norm(load, 2));
         if partition.comm().any(c_prescribed.iter().any(|&v| v != 0.0)) {

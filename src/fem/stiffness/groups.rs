@@ -1,6 +1,6 @@
 //! The sums over the elements of the elasticity, for eight elements at a time in the lanes of the processor.
 
-use crate::fem::{Body, Cells, Elasticity, Element, terms::ElementSums};
+use crate::fem::{Body, Cells, Elasticity, Element, stiffness::ElementSums};
 use nalgebra::Matrix2;
 use std::{array::from_fn, iter::zip};
 use wide::f64x8;

@@ -74,7 +74,7 @@ impl<'a> Observation<'a> {
         let comm = partition.comm();
         let zeta = LazyCell::new(|| problem.zeta_at_points(&state.zeta));
         let stress = |t: usize, at: [f64; 3]| {
-            problem.terms.elasticity.stress_at(body, (t, at), &zeta, &state.u)
+            problem.elasticity.stress_at(body, (t, at), &zeta, &state.u)
         };
         let mut resultants = problem.supports.resultants(body, state, unbalanced, stress);
         comm.sum(resultants.as_flattened_mut());

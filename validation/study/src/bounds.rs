@@ -78,7 +78,7 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
     let error: Vec<f64> = exact.state.u.iter().zip(&own).map(|(u, own)| u - own).collect();
     let energy = |problem: &DiscreteProblem, zeta: &[f64], u: &[f64]| {
         let zeta = problem.zeta_at_points(zeta);
-        problem.terms.elasticity.energies(&problem.body, &zeta, u).iter().sum::<f64>()
+        problem.elasticity.energies(&problem.body, &zeta, u).iter().sum::<f64>()
     };
     let of_run = |name: &str| {
         let part = phases.parts("").into_iter().find(|(known, _)| *known == name);
