@@ -306,29 +306,31 @@ fn a_narrow_pressure_on_a_curved_edge_has_the_resultant_of_its_chord() {
 }
 
 #[test]
-fn body_forces_narrower_than_triangles_have_their_resultant_and_moment() {
+fn body_forces_narrower_than_triangles_have_their_resultant_and_moment_or_a_note() {
     let pi = std::f64::consts::PI;
-    let bump = "exp(-((x - 0.31)^2 + (y - 0.6)^2)/0.01^2)/0.01^2";
-    // A strip, and others along sides of the triangles, which are far narrower. What depends on time is
-    // divided less, as it is integrated in each step.
-    let strip = "if(abs(x - 0.6137) < 0.001, 500, 0)";
-    let along = "if(abs(x - 1/3) < 0.5e-6, 1e6, 0)";
-    let beside = "if(x > 1/3 and x < 1/3 + 1e-4, 1e4, 0)";
-    for (force, expected, tolerance) in [
-        (strip, [1.0, 0.6137], 1e-5),
-        (along, [1.0, 1.0 / 3.0], 1e-5),
-        (beside, [1.0, 1.0 / 3.0 + 0.5e-4], 1e-5),
-        (bump, [pi, 0.31 * pi], 1e-3),
-    ] {
+    let bump = "exp(-((x - 0.31)^2 + (y - 0.6)^2)/0.01^2)/0.01^2".to_owned();
+    let mut cases = vec![(bump, [pi, 0.31 * pi], 1e-3)];
+    // Strips across the triangles and along their sides. Those that need too many parts are noted.
+    for (at, width) in [0.6137, 1.0 / 3.0]
+        .into_iter()
+        .flat_map(|at| [0.1, 0.01, 1e-3, 1e-4, 1e-6].map(|width| (at, width)))
+    {
+        let strip = format!("if(abs(x - {at}) < {}, {}, 0)", 0.5 * width, 1.0 / width);
+        cases.push((strip, [1.0, at], 0.05));
+    }
+    // What depends on time is divided less, as it is integrated in each step.
+    for (force, expected, tolerance) in cases {
         for (degree, in_time) in [(1, ""), (2, ""), (1, "*cos(t)"), (2, "*cos(t)")] {
             let boundary = "boundary = [{ name = 'bottom', displacement = [0, 0] }]";
             let text = format!("body.force = [0, '{force}{in_time}']\n{boundary}");
             let problem = loaded(square(3), degree, &text);
-            assert_eq!(problem.notes(), [""; 0], "{force}");
+            let noted = problem.notes().iter().any(|note| note.contains("body force changes too"));
             let [_, sum, moment] = resultant(&problem, 0.0);
             for (value, expected) in [sum, moment].into_iter().zip(expected) {
                 let error = (value - expected).abs() / expected;
-                assert!(error < tolerance, "P{degree}: {force}{in_time}: {value}, {expected}");
+                let case = format!("P{degree}: {force}{in_time}: {value}, {expected}");
+                assert!(noted || error < tolerance, "{case}");
+                assert!(!noted || error > 1e-4, "noted without need: {case}");
             }
         }
     }

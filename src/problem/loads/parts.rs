@@ -10,9 +10,6 @@
 //! The sum of both over all parts bounds the missed part of ∫|f|. The error of the integral is estimated from the
 //! differences e = ∫f − ∫f₂ and d = max |f − f₂| times the measure by √((Σe)² + Σ(e² + d²/25)): parts may err with one sign, or
 //! with signs by chance. Where f has a jump or a kink in an edge, e² + d²/25 covers the error of three Gauss points.
-//!
-//! A strip along the sides of triangles would need too many parts. Triangles that miss much are therefore cut into slices
-//! along a side, if slices miss less.
 
 use crate::{
     fem::{Body, GAUSS, POINTS, parabola, part_point, quadratic_values, six_points},
@@ -35,13 +32,6 @@ const WITHIN: f64 = 1e-7;
 const MAX_BISECTIONS: usize = 40;
 /// A triangle as its only part.
 pub(crate) const WHOLE: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// If all triangles together miss more than this fraction of ∫|f|, some are sliced.
-const MISSED: f64 = 1e-4;
-/// Maximum number of sliced triangles, and of slices per triangle.
-const MAX_SLICED: usize = 1000;
-const MAX_SLICES: usize = 200;
-/// The relative error of the integral over slices.
-const DEVIATION_OF_SLICES: f64 = 1e-6;
 /// Samples in a part, times the measure of the part: ∫|f|, max |f − f₂|, the highest possible hidden peak, and ∫f − ∫f₂.
 #[derive(Clone, Copy)]
 struct Sampled {
@@ -70,20 +60,14 @@ pub(crate) struct Parts<P> {
 
 impl<P> Parts<P> {
     fn new(parts: Vec<(P, Sampled)>) -> Self {
-        let [integral, missed] = sums(&parts, None);
+        let integral: f64 = parts.iter().map(|(_, of)| of.integral).sum();
+        let missed: f64 = parts.iter().map(|(_, of)| of.missed(integral)).sum();
         let missed = if missed > 0.0 { missed / integral } else { 0.0 };
         let sum: f64 = parts.iter().map(|(_, of)| of.error).sum();
         let squares = parts.iter().map(|(_, of)| of.error.powi(2) + (0.2 * of.deviation).powi(2));
         let error = sum.hypot(squares.sum::<f64>().sqrt());
         Self { parts: parts.into_iter().map(|(part, _)| part).collect(), missed, error }
     }
-}
-
-/// ∫|f| over `parts`, and how much of it may be missed. `integral` is ∫|f| over these and all other parts.
-fn sums<P>(parts: &[(P, Sampled)], integral: Option<f64>) -> [f64; 2] {
-    let own = parts.iter().map(|(_, sampled)| sampled.integral).sum();
-    let integral = integral.unwrap_or(own);
-    [own, parts.iter().map(|(_, sampled)| sampled.missed(integral)).sum()]
 }
 
 /// Bisects parts until all are small enough for a `deviation`, or there would be more than `most`.
@@ -170,60 +154,7 @@ pub(crate) fn triangle_parts(
         let middle = mean(a, b);
         [(triangle, [c, a, middle]), (triangle, [b, c, middle])]
     };
-    let parts = bisected(whole, [DEVIATION, triangles.len() as f64 + more], sample, halves);
-    let [integral, missed] = sums(&parts, None);
-    if missed <= MISSED * integral {
-        return Parts::new(parts);
-    }
-    let mut of_triangles = vec![Vec::new(); triangles.len()];
-    parts.into_iter().for_each(|part| of_triangles[part.0.0].push(part));
-    let missed = |parts: &[(TrianglePart, Sampled)]| sums(parts, Some(integral))[1];
-    let mut worst: Vec<_> = of_triangles.iter().map(|parts| missed(parts)).enumerate().collect();
-    worst.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-    worst.truncate(MAX_SLICED);
-    for (triangle, _) in worst.into_iter().filter(|(_, missed)| *missed > 0.0) {
-        for side in 0..3 {
-            let Some(slices) = slices(&triangles[triangle], side, f, times) else { continue };
-            let slices = slices.into_iter().map(|corners| (triangle, corners));
-            let slices: Vec<_> = slices.map(|part| (part, sample(part))).collect();
-            if missed(&slices) < missed(&of_triangles[triangle]) {
-                of_triangles[triangle] = slices;
-            }
-        }
-    }
-    Parts::new(of_triangles.into_iter().flatten().collect())
-}
-
-/// Slices of a triangle along one of its sides, in two parts each. Their thickness resolves `f` along a line across
-/// them. `None` if there are too many.
-fn slices(
-    triangle: &[[f64; 2]; 6],
-    side: usize,
-    f: &[Expression],
-    times: &[f64],
-) -> Option<Vec<[[f64; 3]; 3]>> {
-    let [a, b, c] = [0, 1, 2].map(|i| WHOLE[(side + i) % 3]);
-    let across = mean(a, b);
-    let line = [c, mean(c, across), across].map(|point| triangle_point(triangle, point));
-    let ends = times.iter().flat_map(|&t| edge_parts(&[line], f, t, DEVIATION_OF_SLICES).parts);
-    let mut ends: Vec<f64> = ends.map(|(_, [_, to])| to).collect();
-    ends.sort_by(f64::total_cmp);
-    ends.dedup();
-    if ends.len() > MAX_SLICES {
-        return None;
-    }
-    let at = |corner: [f64; 3], r: f64| [0, 1, 2].map(|k| c[k] + r * (corner[k] - c[k]));
-    let mut from = 0.0;
-    let mut parts = Vec::new();
-    for to in ends {
-        let [p, q, r, s] = [at(a, from), at(a, to), at(b, to), at(b, from)];
-        parts.push([p, q, r]);
-        if from > 0.0 {
-            parts.push([p, r, s]);
-        }
-        from = to;
-    }
-    Some(parts)
+    Parts::new(bisected(whole, [DEVIATION, triangles.len() as f64 + more], sample, halves))
 }
 
 /// The point of a quadratic triangle of six points at barycentric coordinates, m.
