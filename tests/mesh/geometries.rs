@@ -282,6 +282,18 @@ fn every_scene_has_a_mesh_at_every_size() {
 }
 
 #[test]
+fn messages_of_gmsh_have_no_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = folder.path().join("part.step");
+    let header = "HEADER;\nFILE_DESCRIPTION((\"\"),\"2;1\");\nENDSEC;";
+    let text =
+        format!("ISO-10303-21;\n{header}\nDATA;\n#1=GARBAGE(;\nENDSEC;\nEND-ISO-10303-21;\n");
+    fs::write(&part, text).unwrap();
+    let message = load(&part, &BTreeMap::new(), Order::Linear).unwrap_err().to_string();
+    assert!(message.contains("part.step") && !message.contains('\x1b'), "{message:?}");
+}
+
+#[test]
 fn what_gmsh_rejects_is_told() {
     let (folder, geo) = copy("square");
     let fails = |pairs: &[(&str, f64)]| {
@@ -297,12 +309,21 @@ fn what_gmsh_rejects_is_told() {
     assert!(fails(&[("n", f64::NAN)]).contains("must be finite"));
     assert!(fails(&[("../n", 1.0)]).contains("letters, digits"));
 
-    // The size alone bounds the triangles of this geometry; gmsh would work for hours.
+    // gmsh would work for hours, whether `size` alone bounds the triangles or the geometry itself.
     let sides = "Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 1}; Curve Loop(1) = {1, 2, 3};";
     let points = "Point(1) = {0, 0, 0}; Point(2) = {2, 0, 0}; Point(3) = {0, 1, 0};";
     fs::write(&geo, format!("{points}\n{sides}\nPlane Surface(1) = {{1}};\n")).unwrap();
     let message = fails(&[("size", 1e-6)]);
-    assert!(message.contains("size = 0.000001 is too small for a body of 2 by 1"), "{message}");
+    assert!(message.contains("size = 1e-06 is too small for a body of 2 by 1"), "{message}");
+    for bound in ["Mesh.MeshSizeMax = 1e-7;", "Mesh.CharacteristicLengthMax = size / 10;"] {
+        let size = "DefineConstant[ size = 1e-6 ];";
+        let text = format!("{size}\n{points}\n{sides}\nPlane Surface(1) = {{1}};\n{bound}\n");
+        fs::write(&geo, text).unwrap();
+        for parameters in [&[][..], &[("size", 1e-6)]] {
+            let message = fails(parameters);
+            assert!(message.contains("is too small for a body of 2 by 1"), "{bound}: {message}");
+        }
+    }
 
     fs::write(&geo, "Point(1) = {0, 0, 0};\nLine(1) = {1, ;\n").unwrap();
     let message = fails(&[]);

@@ -4,6 +4,7 @@ mod cache;
 mod process;
 
 pub use cache::renamed;
+use process::{BOX, SQUARES};
 pub(super) use process::{note, run};
 
 use super::{
@@ -210,7 +211,7 @@ fn bounds_by_size(text: &str) -> bool {
 
 /// Commands that gmsh reads after the `.geo` file `text`. They make it an error if the `.geo` has changed a
 /// parameter, and they set the order and the largest size. (Options of the command line would give way to
-/// those in the `.geo`.)
+/// those in the `.geo`.) A size that is far too small is an error, whichever file sets it.
 fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> String {
     let checks = parameters.iter().map(|(name, value)| {
         format!(
@@ -220,16 +221,13 @@ fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> S
     });
     let order = if order == Order::Quadratic { "Mesh.ElementOrder = 2;\n" } else { "" };
     let size = parameters.get("size").filter(|_| !bounds_by_size(text));
-    let [width, height] = ["X", "Y"].map(|axis| format!("General.Max{axis} - General.Min{axis}"));
-    let size = size.map_or(String::new(), |size| {
-        format!(
-            "Mesh.MeshSizeMax = {size};\nBoundingBox;\n\
-             If (({width}) * ({height}) / {size}^2 > {MOST_SQUARES:e})\n \
-             Error(\"size = {size} is too small for a body of %g by %g (in the unit of the geometry; gmsh reads \
-             .step in mm)\", {width}, {height});\n Exit;\nEndIf\n"
-        )
-    });
-    checks.chain([order.to_owned(), size]).collect()
+    let size = size.map_or(String::new(), |size| format!("Mesh.MeshSizeMax = {size};\n"));
+    let too_small = format!(
+        "BoundingBox;\nIf ({SQUARES} > {MOST_SQUARES:e})\n \
+         Error(\"size = %g is too small for a body of %g by %g (in the unit of the geometry; gmsh reads .step in \
+         mm)\", Mesh.MeshSizeMax, {BOX});\n Exit;\nEndIf\n"
+    );
+    checks.chain([order.to_owned(), size, too_small]).collect()
 }
 
 /// gmsh's arguments for a mesh with these parameters.

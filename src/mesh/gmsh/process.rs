@@ -24,6 +24,16 @@ const POLL: Duration = Duration::from_millis(5);
 /// After this time a message says that gmsh is at work.
 const NOTE_AFTER: Duration = Duration::from_secs(5);
 
+/// From this number of triangles on, the message comes at once. gmsh makes about 1e5 in a second.
+const MANY: f64 = 1e6;
+
+/// gmsh's expressions for the width and the height of the box around the geometry, after `BoundingBox;`.
+pub const BOX: &str = "General.MaxX - General.MinX, General.MaxY - General.MinY";
+/// And for the number of squares in it whose side is the largest size.
+pub const SQUARES: &str =
+    "(General.MaxX - General.MinX) * (General.MaxY - General.MinY) / Mesh.MeshSizeMax^2";
+/// The equilateral triangles of this side that fill a square: 4/√3.
+const TRIANGLES_PER_SQUARE: f64 = 2.31;
 /// The command that writes gmsh's version, as [`Mesh::gmsh`](crate::mesh::Mesh::gmsh) has it.
 const VERSION: &str =
     "Printf(\"gmsh %g.%g.%g\", GMSH_MAJOR_VERSION, GMSH_MINOR_VERSION, GMSH_PATCH_VERSION)";
@@ -41,9 +51,14 @@ pub fn run(
     task: &str,
 ) -> Result<Vec<u8>, MeshError> {
     let scratch = tempfile::tempdir().map_err(MeshError::io(&env::temp_dir()))?;
-    let [made, second, version, log] =
-        ["made.msh", "second.geo", "version", "log"].map(|name| scratch.path().join(name));
-    let last = format!("{last}{VERSION} > \"{}\";\n", version.display());
+    let [made, second, version, squares, log] =
+        ["made.msh", "second.geo", "version", "squares", "log"]
+            .map(|name| scratch.path().join(name));
+    let last = format!(
+        "{last}{VERSION} > \"{}\";\nBoundingBox;\nPrintf(\"%g\", {SQUARES}) > \"{}\";\n",
+        version.display(),
+        squares.display()
+    );
     fs::write(&second, last).map_err(MeshError::io(&second))?;
     let mut command = Command::new("gmsh");
     command.args(["-format", "msh41", "-v", "1"]).args(arguments).arg("-o").arg(&made);
@@ -72,10 +87,14 @@ pub fn run(
         }
         _ => MeshError::io(Path::new("gmsh"))(source),
     })?;
-    let status = wait(child, input, task)?;
+    let status = wait(child, &squares, input, task)?;
 
     let said = fs::read(&log).map_err(MeshError::io(&log))?;
-    let said = String::from_utf8_lossy(&said);
+    // OpenCASCADE colours its messages: \x1b[…m.
+    let plain =
+        |part: &str| part.split_once('m').map_or(String::new(), |(_, text)| text.to_owned());
+    let said = format!("\x1b[m{}", String::from_utf8_lossy(&said));
+    let said: String = said.split("\x1b[").map(plain).collect();
     // gmsh can report errors and still exit with success.
     let is_error = |line: &str| line.trim_start().starts_with("Error");
     if status.success() && made.exists() && !said.lines().any(is_error) {
@@ -105,7 +124,12 @@ pub fn note(file: &Path, text: &str) {
 }
 
 /// Waits for gmsh. Ends it after the time limit or on a signal to this process.
-fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshError> {
+fn wait(
+    mut gmsh: Child,
+    squares: &Path,
+    input: &Path,
+    task: &str,
+) -> Result<ExitStatus, MeshError> {
     let (started, _interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
@@ -114,10 +138,19 @@ fn wait(mut gmsh: Child, input: &Path, task: &str) -> Result<ExitStatus, MeshErr
         if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
             return Ok(status);
         }
-        if !told && started.elapsed() > NOTE_AFTER {
+        let triangles = || {
+            let squares: f64 = fs::read_to_string(squares).ok()?.trim().parse().ok()?;
+            Some(TRIANGLES_PER_SQUARE * squares).filter(|triangles| *triangles >= 1.0)
+        };
+        if !told && (started.elapsed() > NOTE_AFTER || triangles().is_some_and(|all| all > MANY)) {
+            let of =
+                triangles().map_or(String::new(), |all| format!(" on up to {all:.0e} triangles"));
             note(
                 input,
-                "gmsh is at work; a larger size is quicker (sizes are in the unit of the geometry: gmsh reads .step in mm)",
+                &format!(
+                    "gmsh is at work{of}; a larger size is quicker (sizes are in the unit of the geometry: gmsh reads \
+                     .step in mm)"
+                ),
             );
             told = true;
         }
