@@ -180,8 +180,8 @@ pub(super) fn boundary(keys: BoundaryKeys) -> Result<Boundary, Diagnostic> {
     let conditions: Vec<_> = conditions.into_iter().flatten().collect();
     if let Some([one, other]) = contradiction(&conditions, &conditions) {
         let problem = format!(
-            "has {one} and {other}; an edge can have only one of them: give the other to another physical curve, \
-             which may end at this one"
+            "has {one} and {other}; an edge can have only one of them: give the other to another boundary, which may \
+             end at this one"
         );
         return Err(("", problem));
     }

@@ -188,7 +188,7 @@ impl Scene {
                 let [x, y] = midpoint(mesh.nodes[p], mesh.nodes[q]);
                 let problem = format!(
                     "has {has}, but boundary \"{}\" on the same edge at ({x}, {y}) has {others}; \
-                     an edge can have only one of them: take it out of one of the two physical curves",
+                     an edge can have only one of them: take it out of one of the two boundaries",
                     other.name
                 );
                 problems.push(self.at_name(boundary, &problem));
@@ -213,7 +213,7 @@ impl Scene {
         let how = if cosine < -OUTWARD { "into the body" } else { "along the boundary" };
         let problem = format!(
             "points {how} at ({x}, {y}), where the outward normal is ({vx:.4}, {vy:.4}); it must point from the body \
-             towards the obstacle, all along the physical curve"
+             towards the obstacle, all along the boundary"
         );
         Some(self.at_key(&boundary_key(&boundary.name, "normal"), &problem))
     }

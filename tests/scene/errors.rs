@@ -125,7 +125,7 @@ error: bad.toml:33: boundary.load.traction[1] has the unknown variable `s` (know
    |
 33 | traction = ["0", "-80*s"]
    |                  ^^^^^^^
-error: bad.toml:39: boundary.axis has a symmetry and a gap; an edge can have only one of them: give the other to another physical curve, which may end at this one
+error: bad.toml:39: boundary.axis has a symmetry and a gap; an edge can have only one of them: give the other to another boundary, which may end at this one
    |
 39 | [[boundary]]
    | ^^^^^^^^^^^^"#

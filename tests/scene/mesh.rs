@@ -130,7 +130,7 @@ fn boundaries_that_share_an_edge_do_not_contradict_each_other() {
     refused(
         "symmetry = true",
         "has a symmetry, but boundary \"clamp\" on the same edge at (2, 1) has a displacement; \
-         an edge can have only one of them: take it out of one of the two physical curves",
+         an edge can have only one of them: take it out of one of the two boundaries",
     );
     refused("gap = 0", "a gap, but boundary \"clamp\" on the same edge at (2, 1) has a disp");
     refused("traction = [0, 1]", "\"clamp\" on the same edge at (2, 1) has both displacements");
