@@ -78,6 +78,17 @@
 
 pub use nalgebra;
 
+/// `Debug` of an error is its message, as Rust prints it if `main` returns the error.
+macro_rules! debug_is_message {
+    ($error:ty) => {
+        impl std::fmt::Debug for $error {
+            fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                std::fmt::Display::fmt(self, f)
+            }
+        }
+    };
+}
+
 pub mod interrupt;
 pub mod memory;
 pub mod phases;

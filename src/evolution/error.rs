@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Why a run ended early.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum RunError {
     /// A contact step failed; the steps before it are accepted.
     #[error("{}{source}{advice}", time.map_or(String::new(), |t| format!("step {step} (t = {}): ", rounded(t))))]
@@ -58,6 +58,8 @@ pub enum RunError {
     #[error(transparent)]
     Observer(Box<dyn std::error::Error + Send + Sync>),
 }
+
+debug_is_message!(RunError);
 
 /// The part of a step that failed, other than contact.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

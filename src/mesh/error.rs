@@ -7,7 +7,7 @@ use std::{
 };
 
 /// Why there is no mesh.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
     /// A file could not be read or written.
@@ -35,6 +35,8 @@ pub enum MeshError {
     #[error("the triangle at ({}, {}) is too curved; start from a finer mesh there", .0[0], .0[1])]
     TooCurved([f64; 2]),
 }
+
+debug_is_message!(MeshError);
 
 impl MeshError {
     pub(super) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {

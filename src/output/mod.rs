@@ -29,12 +29,14 @@ use std::{
 };
 
 /// The results could not be written.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[error("cannot write {path}: {reason}")]
 pub struct OutputError {
     path: PathBuf,
     reason: String,
 }
+
+debug_is_message!(OutputError);
 
 impl OutputError {
     /// The file at `path` cannot be written.

@@ -12,7 +12,7 @@ use std::{
 pub(super) const NOT_DEFINITE: i32 = 81;
 
 /// A call of PETSc or CHOLMOD failed, or its arguments do not fit.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Clone, thiserror::Error)]
 #[error("{}{message}", match code { 0 => String::new(), code => format!("PETSc error {code}: ") })]
 pub struct PetscError {
     /// PETSc's error code (petscerror.h); 0 if our own checks or CHOLMOD found the error.
@@ -20,6 +20,8 @@ pub struct PetscError {
     /// PETSc's message at the place where the error arose.
     pub message: String,
 }
+
+debug_is_message!(PetscError);
 
 impl PetscError {
     /// An error that our own checks or CHOLMOD found, not PETSc.

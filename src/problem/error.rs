@@ -7,7 +7,7 @@ use crate::{
 use std::path::PathBuf;
 
 /// Errors in the input: the scene and its mesh do not pose a problem.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum SetupError {
     /// The scene does not fit the mesh.
     #[error(transparent)]
@@ -33,3 +33,5 @@ pub enum SetupError {
         source: DrivenMotion,
     },
 }
+
+debug_is_message!(SetupError);
