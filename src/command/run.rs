@@ -230,7 +230,10 @@ fn solve(
     loop {
         let started = Instant::now();
         let (recorder, result) = solve_once(&task, restart.take(), session)?;
-        let shorter = |outcome: &Outcome| outcome.shorter_steps(&task.problem, &task.measured);
+        // Lengths of steps are on a ladder of √2, and their errors are of second order: an error may be twice the one
+        // asked for.
+        let shorter =
+            |outcome: &Outcome| Some(0.5 * outcome.shorter_steps(&task.problem, &task.measured)?);
         let ratio = result.as_ref().ok().and_then(shorter);
         let seconds = session.comm().max(started.elapsed().as_secs_f64());
         let ratio = ratio.filter(|ratio| has_time(&task, seconds, *ratio));
@@ -239,9 +242,7 @@ fn solve(
                 drop(recorder);
                 confirm_stop(session, &mut task, &outcome)?;
                 if let Some(adapted) = &mut task.adapted {
-                    // Lengths of steps are on a ladder of √2, and their errors are of second order: an error
-                    // may be twice the one asked for.
-                    adapted.steps *= 0.5 * ratio;
+                    adapted.steps *= ratio;
                     task.problem.set_step_tolerance(adapted.steps);
                 }
                 task.repeats = true;
