@@ -12,6 +12,10 @@ use crate::{
 const LARGE: f64 = 0.1;
 const NOTICEABLE: f64 = 0.01;
 
+/// A body that moves by less than this part of its size is noted. Loads that matter strain it by 1e-6 or more; E in Pa beside
+/// lengths in mm and forces in N divides all displacements by 1e6.
+const HARDLY: f64 = 1e-8;
+
 impl Outcome {
     /// Notes for the user on the run of `problem`. Collective.
     pub fn notes(&self, problem: &DiscreteProblem) -> Vec<String> {
@@ -55,8 +59,16 @@ impl Outcome {
         let size = extent(&problem.mesh().nodes);
         let has_gaps = problem.scene().boundaries.iter().any(|boundary| boundary.gap().is_some());
         let of_model = [
-            (most == 0.0 && has_gaps).then(|| {
+            // A stop in the first step has no state that moves.
+            (most == 0.0 && has_gaps && self.stopped.is_none()).then(|| {
                 "nothing moves: no load acts and no foundation presses; check their signs".to_owned()
+            }),
+            (0.0 < most && most < HARDLY * size).then(|| {
+                let part = most / size;
+                format!(
+                    "the largest displacement is only {part:.0e} of the body's size: is E in the unit of the stresses \
+                     (N/mm² with mm and N)?"
+                )
             }),
             (moved > size).then(|| {
                 let times = moved / size;

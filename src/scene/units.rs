@@ -1,26 +1,14 @@
 //! The names of the units of a scene.
 
-/// Units that are checked, in SI units.
-const LENGTH_UNITS: [(&str, f64); 7] = [
-    ("µm", 1e-6),
-    ("mm", 1e-3),
-    ("cm", 1e-2),
-    ("m", 1.0),
-    ("km", 1e3),
-    ("in", 0.0254),
-    ("ft", 0.3048),
-];
-const FORCE_UNITS: [(&str, f64); 5] =
-    [("mN", 1e-3), ("N", 1.0), ("kN", 1e3), ("MN", 1e6), ("lbf", 4.448_222)];
-const STRESS_UNITS: [(&str, f64); 7] = [
-    ("Pa", 1.0),
-    ("kPa", 1e3),
-    ("MPa", 1e6),
-    ("GPa", 1e9),
-    ("bar", 1e5),
-    ("psi", 6_894.757),
-    ("ksi", 6_894_757.0),
-];
+/// Prefixes of m, N and Pa in units that are checked, and their powers of ten.
+const PREFIXES: [(&str, i32); 7] =
+    [("", 0), ("µ", -6), ("m", -3), ("c", -2), ("k", 3), ("M", 6), ("G", 9)];
+
+/// The power of ten of a unit with this base. `None` if the program does not know it.
+fn power(unit: &str, base: &str) -> Option<i32> {
+    let prefix = unit.strip_suffix(base)?;
+    PREFIXES.iter().find(|(known, _)| *known == prefix).map(|(_, power)| *power)
+}
 
 /// The names of a scene's units. They label the results; the program converts no units.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -53,15 +41,16 @@ impl Units {
 
     /// A remark on a unit of stress that is not force/length². Units that the program does not know are right.
     pub fn contradiction(&self) -> Option<String> {
-        let si = |table: &[(&str, f64)], unit: &str| {
-            table.iter().find(|(name, _)| *name == unit).map(|(_, si)| *si)
+        let quotient =
+            |force: &str, length: &str| Some(power(force, "N")? - 2 * power(length, "m")?);
+        let stress = match self.stress.trim_end_matches(['²', '^', '2']).split_once('/') {
+            Some((force, length)) => quotient(force, length)?,
+            None => power(&self.stress, "Pa")?,
         };
-        let [force, length] = [si(&FORCE_UNITS, &self.force)?, si(&LENGTH_UNITS, &self.length)?];
-        let stress = si(&STRESS_UNITS, &self.stress)?;
-        let ratio = force / (length * length) / stress;
-        ((ratio - 1.0).abs() > 1e-3).then(|| {
+        let ratio = quotient(&self.force, &self.length)? - stress;
+        (ratio != 0).then(|| {
             format!(
-                "units: {0}/{1}² is {ratio:.3e} {2}, so stresses and moduli in {0}/{1}² are no {2}; [units] only \
+                "units: {0}/{1}² is 1e{ratio} {2}, so stresses and moduli in {0}/{1}² are no {2}; [units] only \
                  names them, nothing is converted",
                 self.force, self.length, self.stress
             )

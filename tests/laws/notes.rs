@@ -35,6 +35,13 @@ fn large_strains_rotations_and_ways_are_noted() {
         "{far:?}"
     );
     assert_eq!(notes(pressed(0.9, "-9").unwrap()), [""; 0]);
+    // E in Pa beside N and mm divides displacements by 1e6.
+    assert_eq!(notes(pressed(0.0, "-1e-3").unwrap()), [""; 0]);
+    let hardly = notes(pressed(0.0, "-1e-9").unwrap());
+    assert!(
+        hardly.len() == 1 && hardly[0].contains("is only 1e-11 of the body's size"),
+        "{hardly:?}"
+    );
     // A linearised rotation of θ has |∇u| = √2 θ, whatever the strain.
     for (angle, told) in [(0.07, 0), (0.0708, 1)] {
         let turned = format!(
@@ -109,21 +116,29 @@ fn what_the_nodes_miss_of_a_displacement_or_the_initial_damage_is_noted() {
 
 #[test]
 fn an_answer_without_any_motion_is_noted_and_the_end_of_a_cycle_is_not() {
-    let in_time = |load: &str| {
+    let damaged = |load: &str, damage: &str| {
         let text = format!(
             "{MATERIAL}
+             {damage}
              time = {{ end = 1, step = 0.25 }}
              boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
                          {{ name = 'top', traction = [0, '{load}'] }}]"
         );
         problem(square(4), &text).unwrap()
     };
+    let in_time = |load: &str| damaged(load, "");
     let notes = |problem: DiscreteProblem| run(&problem, SOLVERS[0]).notes(&problem);
     for still in [pressed(1.0, "0").unwrap(), in_time("0")] {
         let notes = notes(still);
         assert!(notes.len() == 1 && notes[0].starts_with("nothing moves:"), "{notes:?}");
     }
     assert_eq!(notes(in_time("-min(t, 1 - t)")), [""; 0]);
+    // The body breaks in the first step, before the load has moved it.
+    let breaks = "damage = { diffusion = 1, lambda_d = 1, lambda_u = 0, initial = 0.1 }";
+    let broken = damaged("-t", breaks);
+    let outcome = run(&broken, SOLVERS[0]);
+    assert!(outcome.stopped.is_some() && outcome.last.record.step == 0);
+    assert!(!outcome.notes(&broken).iter().any(|note| note.contains("nothing moves")));
 }
 
 #[test]
@@ -196,8 +211,11 @@ fn what_is_odd_in_a_scene_is_noted_and_nothing_else() {
     for (scene, told) in [
         (units("MPa"), ""),
         (units("N/mm²"), ""),
-        (units("GPa"), "N/mm² is"),
-        (units("psi"), "N/mm² is"),
+        (units("GPa"), "N/mm² is 1e-3 GPa"),
+        (units("N/m²"), "N/mm² is 1e6 N/m²"),
+        (units("kN/cm^2"), "N/mm² is 1e-1 kN/cm^2"),
+        (units("N/mm^2"), ""),
+        (units("psi"), ""),
         (clamped(damage), "[damage] without [time]"),
         // A pulse between two steps, and waves of the length of a step.
         (loaded("if(t > 0.301 and t < 0.302, -4, 0)"), "change within a time step"),
@@ -211,5 +229,17 @@ fn what_is_odd_in_a_scene_is_noted_and_nothing_else() {
         let notes = problem.unwrap_or_else(|e| panic!("{e}")).notes();
         let is_told = notes.len() == usize::from(!told.is_empty());
         assert!(is_told && notes.iter().all(|note| note.contains(told)), "{scene}: {notes:?}");
+    }
+}
+
+#[test]
+fn an_error_that_main_returns_is_printed_as_its_message() {
+    let driven = pressed(0.0, "1").unwrap_err();
+    let own = RunError::from(pressed(0.0, "1").unwrap_err());
+    for (printed, message) in
+        [(format!("{driven:?}"), driven.to_string()), (format!("{own:?}"), own.to_string())]
+    {
+        assert_eq!(printed, message);
+        assert!(message.contains("nothing supports the body"), "{message}");
     }
 }
