@@ -1,4 +1,4 @@
-//! Wall time of a run and bytes moved in it, by named phases.
+//! Wall time of a run by named phases.
 
 use std::{cell::RefCell, collections::BTreeMap, time::Instant};
 
@@ -9,8 +9,6 @@ pub struct Phase {
     pub calls: f64,
     /// The wall time of all calls, s.
     pub seconds: f64,
-    /// The bytes that all calls moved between memory and processor; 0 if not known.
-    pub bytes: f64,
 }
 
 /// Named phases of a run. A name with a slash (`contact/products`) is a part of the phase before the slash.
@@ -21,17 +19,11 @@ pub struct Phases(RefCell<BTreeMap<&'static str, Phase>>);
 impl Phases {
     /// Runs `work` and adds its wall time to the phase `name`.
     pub fn time<R>(&self, name: &'static str, work: impl FnOnce() -> R) -> R {
-        self.time_moving(name, (1.0, 0.0), work)
+        self.time_part(name, 1.0, work)
     }
 
-    /// As [`Self::time`], for work that is this part of a call and moves these bytes. Every array that the work reads or
-    /// writes counts once per call.
-    pub fn time_moving<R>(
-        &self,
-        name: &'static str,
-        (call, bytes): (f64, f64),
-        work: impl FnOnce() -> R,
-    ) -> R {
+    /// As [`Self::time`], for work that is this part of a call.
+    pub fn time_part<R>(&self, name: &'static str, call: f64, work: impl FnOnce() -> R) -> R {
         let started = Instant::now();
         let result = work();
         let seconds = started.elapsed().as_secs_f64();
@@ -39,7 +31,6 @@ impl Phases {
         let phase = phases.entry(name).or_default();
         phase.calls += call;
         phase.seconds += seconds;
-        phase.bytes += bytes;
         result
     }
 

@@ -35,17 +35,14 @@ fn rows(phases: &Phases, whole: &str, seconds: f64) -> Vec<(&'static str, Phase)
 }
 
 /// A row of the table with its titles. Cells without a measurement are empty.
-fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 7] {
-    let Phase { calls, seconds, bytes } = phase;
+fn cells(name: String, phase: Phase, wall: f64) -> [(&'static str, String); 5] {
+    let Phase { calls, seconds } = phase;
     let if_called = |text: String| if calls > 0.0 { text } else { String::new() };
-    let if_moved = |text: String| if bytes > 0.0 { text } else { String::new() };
     [
         ("phase", name),
         ("calls", if_called(calls.to_string())),
         ("seconds", format!("{seconds:.3}")),
         ("share", format!("{:.1} %", 100.0 * seconds / wall)),
         ("ms per call", if_called(format!("{:.3}", 1e3 * seconds / calls))),
-        ("MB per call", if_moved(format!("{:.1}", 1e-6 * bytes / calls))),
-        ("GB/s", if_moved(format!("{:.1}", 1e-9 * bytes / seconds))),
     ]
 }

@@ -167,9 +167,8 @@ impl<'a> ContactStep<'a> {
         let (comm, zeta_at_points) =
             (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
         if comm.any(zeta_at_points != self.zeta_at_points) {
-            let bytes = self.stiffness.bytes();
-            phases.time_moving("stiffness", (1.0, bytes), || {
-                self.stiffness.set_damage(&problem.body, &zeta_at_points)
+            phases.time("stiffness", || {
+                self.stiffness.set_damage(&problem.body, &zeta_at_points);
             });
             self.zeta_at_points = zeta_at_points;
         }

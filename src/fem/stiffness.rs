@@ -48,9 +48,6 @@ pub(crate) trait ElementSums {
     /// Calls `add` for the pairs of nodes (i, j), j ≤ i, of every element: the numbers of (i, j) and of (j, i) among
     /// all pairs, the nodes, and K_ij. Element e has the pairs N² e to N² (e + 1), row by row.
     fn for_blocks(&self, add: &mut dyn FnMut([usize; 2], [usize; 2], Matrix2<f64>));
-
-    /// The memory of these data, bytes.
-    fn bytes(&self) -> usize;
 }
 
 /// The place of a row that is not stored.
@@ -114,11 +111,6 @@ impl Stiffness {
         let (scale, operator) = (operator.scale, Rc::new(RefCell::new(operator)));
         matrix.set_operator(Rc::clone(&operator) as Rc<dyn Operator>)?;
         Ok(Self { matrix, scale, operator })
-    }
-
-    /// Bytes that [`Self::set_damage`] reads and writes: the elements, and ζ.
-    pub fn bytes(&self) -> f64 {
-        self.operator.bytes()
     }
 
     /// K(ζ) from the values of ζ at the quadrature points, [`Body::at_points`]. (For P1, where strains
@@ -196,11 +188,6 @@ impl Operator for RefCell<ElementOperator> {
         fixed.iter().for_each(|&(place, on_diagonal)| {
             entries[place as usize] = if on_diagonal { *scale } else { 0.0 };
         });
-    }
-
-    fn bytes(&self) -> f64 {
-        let ElementOperator { sums, nodes, .. } = &*self.borrow();
-        (sums.bytes() + 4 * size_of_val(&nodes.points[..])) as f64
     }
 }
 

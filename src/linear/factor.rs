@@ -143,14 +143,6 @@ impl Factor {
         Ok(())
     }
 
-    /// Bytes that an application reads on this rank; 0 if unknown.
-    pub fn bytes_per_application(&self) -> f64 {
-        match &self.substructure {
-            Some((_, Some(factor))) => factor.bytes(),
-            _ => 0.0,
-        }
-    }
-
     /// Sets E for this matrix.
     pub(crate) fn set_scaling(&mut self, matrix: &Matrix) -> Result<(), PetscError> {
         self.scaling.set(matrix)

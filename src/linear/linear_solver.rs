@@ -159,9 +159,8 @@ impl LinearSolver {
         if !self.factor.exists() {
             return Ok(None);
         }
-        let (bytes, residual) = (0.5 * self.factor.bytes_per_application(), &self.residual);
-        let factor = &mut self.factor;
-        system.timed(TRIANGULAR_SOLVES, (0.5, bytes), || factor.condense(residual)).map(Some)
+        let Self { factor, residual, .. } = self;
+        system.timed(TRIANGULAR_SOLVES, 0.5, || factor.condense(residual)).map(Some)
     }
 
     /// Back substitution: `x` ← `x` + d from the last solution for the condensed unknowns. If no prescribed
@@ -175,8 +174,7 @@ impl LinearSolver {
         moved: bool,
         x: &mut Vector,
     ) -> Result<(), PetscError> {
-        let (bytes, d) = (0.5 * self.factor.bytes_per_application(), &mut self.expanded);
-        system.timed(TRIANGULAR_SOLVES, (0.5, bytes), || self.factor.expand(d))?;
+        system.timed(TRIANGULAR_SOLVES, 0.5, || self.factor.expand(&mut self.expanded))?;
         self.prepared = !moved;
         if moved {
             self.iterations += 1;

@@ -36,19 +36,13 @@ impl<'a> LinearSystem<'a> {
 
     /// `y` ← A `x`.
     pub(super) fn multiply(self, x: &Vector, y: &mut Vector) -> Result<(), PetscError> {
-        let bytes = self.matrix.bytes_per_product();
-        self.timed(PRODUCT, (1.0, bytes), || self.matrix.multiply(x, y))
+        self.timed(PRODUCT, 1.0, || self.matrix.multiply(x, y))
     }
 
-    /// Does `work`, which is this part of a call and reads and writes these bytes, and adds its time to a phase.
-    pub(super) fn timed<R>(
-        self,
-        name: &'static str,
-        moved: (f64, f64),
-        work: impl FnOnce() -> R,
-    ) -> R {
+    /// Does `work`, which is this part of a call, and adds its time to a phase.
+    pub(super) fn timed<R>(self, name: &'static str, call: f64, work: impl FnOnce() -> R) -> R {
         match self.phases {
-            Some(phases) => phases.time_moving(name, moved, work),
+            Some(phases) => phases.time_part(name, call, work),
             None => work(),
         }
     }

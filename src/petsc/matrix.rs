@@ -258,13 +258,6 @@ impl Matrix {
         }
     }
 
-    /// Bytes that this rank reads and writes in a product. Of a stored matrix, per entry: value and column, 12
-    /// bytes; per row: its start, x and y, 20 bytes.
-    pub fn bytes_per_product(&self) -> f64 {
-        let stored = || 12.0 * self.entries() as f64 + 20.0 * self.owned() as f64;
-        self.operator().map_or_else(stored, Operator::bytes)
-    }
-
     /// Number of rows this rank owns.
     pub fn owned(&self) -> usize {
         self.rows.len()

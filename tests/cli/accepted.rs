@@ -251,9 +251,7 @@ fn the_profile_has_the_parts_of_a_step_and_counts_the_pairs_of_triangular_solves
     let directory = TestDirectory::new();
     let out =
         directory.run(&["--profile", "--set", "boundary.top.traction=[0, '-1 - sin(6*t)']"]).out;
-    for fragment in ["ms per call", "GB/s"] {
-        assert!(out.contains(fragment), "no `{fragment}` in: {out}");
-    }
+    assert!(out.contains("ms per call"), "{out}");
     let row = |name: &str| -> Vec<&str> {
         let line = out.lines().map(str::trim).find(|line| line.starts_with(name));
         line.unwrap_or_else(|| panic!("no `{name}` in: {out}")).split_whitespace().collect()
@@ -267,7 +265,7 @@ fn the_profile_has_the_parts_of_a_step_and_counts_the_pairs_of_triangular_solves
     assert!(parts.iter().sum::<f64>() <= seconds("contact  ") + 2e-3, "{parts:?}: {out}");
     let counted: f64 = directory.column("out/scene", "linear_iterations").iter().sum();
     assert_eq!(row("triangular solves")[2], counted.to_string(), "{out}");
-    assert!(!directory.run(&[]).out.contains("GB/s"), "only when asked for");
+    assert!(!directory.run(&[]).out.contains("ms per call"), "only when asked for");
 }
 
 #[test]

@@ -132,10 +132,6 @@ impl<const N: usize, const Q: usize> ElementSums for Groups<N, Q> {
             }
         }
     }
-
-    fn bytes(&self) -> usize {
-        size_of_val(&self.groups[..])
-    }
 }
 
 impl<const N: usize, const Q: usize> Group<N, Q> {

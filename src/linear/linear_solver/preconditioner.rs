@@ -95,7 +95,7 @@ impl LinearSolver {
     /// # Errors
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
-        system.timed(FACTORISATION, (1.0, 0.0), || self.set_up(system))
+        system.timed(FACTORISATION, 1.0, || self.set_up(system))
     }
 
     fn set_up(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
@@ -131,7 +131,7 @@ impl LinearSolver {
     /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
     pub(super) fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
-        system.timed(PRESCRIPTION, (1.0, 0.0), prescribe)
+        system.timed(PRESCRIPTION, 1.0, prescribe)
     }
 
     /// Makes the preconditioner of a checkpoint again.
@@ -178,7 +178,6 @@ impl ShellPreconditioner for TimedFactor<'_> {
         if let Some(first) = self.first.take() {
             return z.axpby(1.0, first, 0.0);
         }
-        let bytes = self.factor.bytes_per_application();
-        self.system.timed(TRIANGULAR_SOLVES, (1.0, bytes), || self.factor.apply(r, z))
+        self.system.timed(TRIANGULAR_SOLVES, 1.0, || self.factor.apply(r, z))
     }
 }

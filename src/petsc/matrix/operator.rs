@@ -20,9 +20,6 @@ pub(crate) trait Operator {
 
     /// Adds the stored entries of this rank to zeros, in the order of [`Matrix::read_entries`].
     fn write(&self, entries: &mut [f64]);
-
-    /// Bytes that a product reads and writes on this rank.
-    fn bytes(&self) -> f64;
 }
 
 /// The operator of a matrix. Entries are written when they are first read after a change.
