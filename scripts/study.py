@@ -31,7 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from signorini_summaries import COLUMNS, rows_of, summary_of
+from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
 
 # The column of --cases that names the runs.
@@ -193,10 +193,19 @@ def stopping(pool, running):
         raise
 
 
-def run_all(out, everything, inputs, jobs):
+def warn_of_columns(columns, folder):
+    """Prints which columns the first complete run has not: others may have them, but a wrong name can be mended now."""
+    for problem in unknown(columns, [summary_of(folder)]):
+        print(f"warning: {problem.replace('no summary has', f'{folder.name} has no', 1)}", file=sys.stderr, flush=True)
+
+
+def run_all(out, everything, inputs, jobs, columns):
     """Runs commands in their folders, except those that are complete; returns the errors by folder."""
     open_runs = [of for of in everything if not is_complete(*of, inputs)]
     done, failed, jobs = len(everything) - len(open_runs), {}, max(1, min(jobs, len(open_runs)))
+    first = next((folder for folder, command in everything if (folder, command) not in open_runs), None)
+    if first:
+        warn_of_columns(columns, first)
     running = set()
     print(f"{len(everything)} runs, {done} of them complete", flush=True)
     out.mkdir(parents=True, exist_ok=True)
@@ -217,6 +226,9 @@ def run_all(out, everything, inputs, jobs):
                     done, folder = done + 1, open_runs[k][0]
                     failed.update({folder: error} if error else {})
                     print(f"{done}/{len(everything)} {folder.name}{': ' + error if error else ''}", flush=True)
+                    if not first and not error:
+                        first = folder
+                        warn_of_columns(columns, first)
             jobs = 1 if any(later.values()) else jobs
             time.sleep(len(later) == len(open_runs))
             open_runs = [open_runs[k] for k in later]
@@ -259,7 +271,8 @@ def main(prog=None):
     named = [(label, product if label else case + product) for label, case in cases for product in products]
     folders = [out / name for name in names_for(named)]
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
-    failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs)
+    failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs,
+                     arguments.columns or [])
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
     rows, units = rows_of(folders, summaries, arguments.columns or COLUMNS, list(map(dict, chosen)))
     printed(rows, units)

@@ -71,6 +71,12 @@ fn a_study_varies_constants_and_cases_have_labels() {
     let (head, cells) = rows();
     assert!(head.starts_with("run,v,displacement_max"), "{head}");
     assert_eq!([&cells[0][0], &cells[1][0]], ["v=1__E=10", "v=2__E=10"]);
+    // A wrong column is named as soon as there is a run, and again at the end.
+    let wrong = ["--set", "v=1,2", "--set", "constants.E=10", "--columns", "displacment_max"];
+    let said = study(&wrong).expect("Python");
+    let told = said.err.find("has no displacment_max; did you mean").expect("a warning");
+    let again = said.err.find("error: no summary has displacment_max").expect("an error");
+    assert!(said.code == Some(2) && told < again, "{said:?}");
     let u = |row: &[String], k: usize| row[k].parse::<f64>().expect("a number");
     assert!((u(&cells[1], 2) / u(&cells[0], 2) - 2.0).abs() < 0.05, "{cells:?}");
     // The scene as run keeps the constants, for another run and for pictures.

@@ -4,7 +4,7 @@ mod cache;
 mod process;
 
 pub use cache::renamed;
-use process::{BOX, SQUARES};
+use process::{SIDES_OF_BOX, SQUARES};
 pub(super) use process::{note, run};
 
 use super::{
@@ -225,7 +225,7 @@ fn last_words(text: &str, parameters: &BTreeMap<String, f64>, order: Order) -> S
     let too_small = format!(
         "BoundingBox;\nIf ({SQUARES} > {MOST_SQUARES:e})\n \
          Error(\"size = %g is too small for a body of %g by %g (in the unit of the geometry; gmsh reads .step in \
-         mm)\", Mesh.MeshSizeMax, {BOX});\n Exit;\nEndIf\n"
+         mm)\", Mesh.MeshSizeMax, {SIDES_OF_BOX});\n Exit;\nEndIf\n"
     );
     checks.chain([order.to_owned(), size, too_small]).collect()
 }

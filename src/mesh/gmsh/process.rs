@@ -25,10 +25,10 @@ const POLL: Duration = Duration::from_millis(5);
 const NOTE_AFTER: Duration = Duration::from_secs(5);
 
 /// From this number of triangles on, the message comes at once. gmsh makes about 1e5 in a second.
-const MANY: f64 = 1e6;
+const ANNOUNCED: f64 = 1e6;
 
 /// gmsh's expressions for the width and the height of the box around the geometry, after `BoundingBox;`.
-pub const BOX: &str = "General.MaxX - General.MinX, General.MaxY - General.MinY";
+pub const SIDES_OF_BOX: &str = "General.MaxX - General.MinX, General.MaxY - General.MinY";
 /// And for the number of squares in it whose side is the largest size.
 pub const SQUARES: &str =
     "(General.MaxX - General.MinX) * (General.MaxY - General.MinY) / Mesh.MeshSizeMax^2";
@@ -142,7 +142,9 @@ fn wait(
             let squares: f64 = fs::read_to_string(squares).ok()?.trim().parse().ok()?;
             Some(TRIANGLES_PER_SQUARE * squares).filter(|triangles| *triangles >= 1.0)
         };
-        if !told && (started.elapsed() > NOTE_AFTER || triangles().is_some_and(|all| all > MANY)) {
+        if !told
+            && (started.elapsed() > NOTE_AFTER || triangles().is_some_and(|all| all > ANNOUNCED))
+        {
             let of =
                 triangles().map_or(String::new(), |all| format!(" on up to {all:.0e} triangles"));
             note(
