@@ -73,9 +73,8 @@ impl<'a> Observation<'a> {
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let comm = partition.comm();
         let zeta = LazyCell::new(|| problem.zeta_at_points(&state.zeta));
-        let stress = |t: usize, at: [f64; 3]| {
-            problem.elasticity.stress_at(body, (t, at), &zeta, &state.u)
-        };
+        let stress =
+            |t: usize, at: [f64; 3]| problem.elasticity.stress_at(body, (t, at), &zeta, &state.u);
         let mut resultants = problem.supports.resultants(body, state, unbalanced, stress);
         comm.sum(resultants.as_flattened_mut());
         let mut probes = problem.probes.values(problem, state);
