@@ -58,7 +58,8 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
                 let turned = frame.inverse * functions.fixed_rows::<2>(2 * k);
                 local.fixed_rows_mut::<2>(2 * k).copy_from(&turned);
             }
-            let form = composite.form(i, &frame.metric(&triangle.compliance));
+            let form =
+                composite.form(i, &(frame.metric(&triangle.compliance) * triangle.zeta.recip()));
             let (sides, body) = difference(triangle, &forces[t]);
             let error = Composite::<R, D>::ordered(i, &frame.inverse, &sides, &body);
             let gradient = local.transpose() * (form * error);

@@ -75,8 +75,9 @@ pub(super) static QUADRATIC: LazyLock<Composite<12, 24>> = LazyLock::new(|| Comp
 /// A triangle with an affine strain and ζ, and the forces on it.
 pub(super) struct LoadedTriangle<'a> {
     pub(super) frame: Frame,
-    /// The matrix D of A, Pa.
+    /// The matrix D of A, Pa, and its inverse, 1/Pa.
     pub(super) d: &'a Matrix3<f64>,
+    pub(super) compliance: &'a Matrix3<f64>,
     /// (ε_xx, ε_yy, 2ε_xy) and ζ at the vertices.
     pub(super) strains: [Vector3<f64>; 3],
     pub(super) zeta: [f64; 3],
@@ -129,7 +130,14 @@ impl<const R: usize, const D: usize> Composite<R, D> {
         let used = D / 6 - 1;
         let forces = on.sides.iter().flat_map(|side| &side[..used]).chain(&on.body);
         let forces = forces.flat_map(|force| <[f64; 2]>::from(on.frame.inverse * force));
-        self.stresses * SVector::<f64, D>::from_iterator(forces)
+        let mut stresses = SVector::<f64, VALUES>::zeros();
+        // Most scenes have no body force.
+        let columns = self.stresses.as_slice().chunks_exact(VALUES).zip(forces);
+        for (column, force) in columns.filter(|(_, force)| *force != 0.0) {
+            let sums = stresses.as_mut_slice().iter_mut().zip(column);
+            sums.for_each(|(sum, part)| *sum += force * part);
+        }
+        stresses
     }
 
     /// τ, Pa, at the points with their barycentric coordinates.
@@ -143,12 +151,8 @@ impl<const R: usize, const D: usize> Composite<R, D> {
     /// which is never smaller.
     pub(super) fn square(&self, on: &LoadedTriangle) -> f64 {
         let mut errors = self.on_reference(on);
-        let Some((to_reference, compliance)) =
-            on.frame.to_physical.try_inverse().zip(on.d.try_inverse())
-        else {
-            return f64::INFINITY;
-        };
-        let metric = on.frame.metric(&compliance);
+        let Some(to_reference) = on.frame.to_physical.try_inverse() else { return f64::INFINITY };
+        let metric = on.frame.metric(on.compliance);
         let stresses = on.strains.map(|strain| to_reference * (on.d * strain));
         // 1/ζ ≤ its interpolation between the corners of a part.
         let centre = 3.0 / on.zeta.iter().sum::<f64>();

@@ -25,12 +25,13 @@ use crate::{
     evolution::ContactStep,
     fem::{Body, for_elements},
     mesh::{Order, sorted},
+    model::Material,
     petsc::PetscError,
     problem::{DiscreteProblem, ElementLoads, State},
     scene::{Condition, Expression},
 };
 use composite::{Frame, LoadedTriangle, SideForces};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use pressure::{ContactEdge, Foundation};
 use rustc_hash::FxHashMap as HashMap;
 use stars::{BoundaryEdge, Star, StressedTriangle};
@@ -261,6 +262,7 @@ impl<'a> EquilibratedStress<'a> {
         LoadedTriangle {
             frame: Frame::new(triangle.corners),
             d: problem.elasticity.d(&problem.body, t),
+            compliance: &triangle.compliance,
             strains: at_vertices(&self.strains[per_triangle * t..per_triangle * (t + 1)]),
             zeta: problem.body.mesh.triangles[t].map(|vertex| self.zeta[vertex]),
             sides: &self.tractions[t],
@@ -309,6 +311,9 @@ fn stressed(
     let strains = body.strains(u);
     let per_triangle = strains.len() / body.triangles.len();
     let vertices = body.node_of_vertex();
+    let infinite = Matrix3::repeat(f64::INFINITY);
+    let inverse = |of: &Material| of.stiffness().try_inverse().unwrap_or(infinite);
+    let compliances = Vec::from_iter(elasticity.materials().map(inverse));
     let of_triangle = |t: usize| {
         let own = per_triangle * t..per_triangle * (t + 1);
         let (d, zeta) = (elasticity.d(body, t), &zeta_at_points[own.clone()]);
@@ -329,7 +334,8 @@ fn stressed(
             area: body.triangles[t].area(),
             stresses,
             flexibility: 1.0 / (d[(2, 2)] * mean),
-            compliance: d.try_inverse().unwrap_or_default() / mean,
+            zeta: mean,
+            compliance: compliances[body.material(t)],
             // ψ = φ + half of the bubbles of both sides.
             body: [0, 1, 2].map(|i| load[i] + 0.5 * (load[3 + i] + load[3 + (i + 2) % 3])),
             bubbles: [load[3], load[4], load[5]],

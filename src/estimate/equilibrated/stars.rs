@@ -24,8 +24,9 @@ pub(super) struct StressedTriangle {
     pub(super) area: f64,
     /// (σ_xx, σ_yy, σ_xy) at the vertices, Pa.
     pub(super) stresses: [Vector3<f64>; 3],
-    /// 1/(μζ), 1/Pa, and (ζA)⁻¹ as a matrix, 1/Pa.
+    /// 1/(μζ), 1/Pa, the mean of ζ, and A⁻¹ as a matrix, 1/Pa.
     pub(super) flexibility: f64,
+    pub(super) zeta: f64,
     pub(super) compliance: Matrix3<f64>,
     /// ∫ f_B ψ of the vertices, and ∫ f_B b of the bubbles b = 4ψψ of the sides 01, 12, 20.
     pub(super) body: [Vector2<f64>; 3],
