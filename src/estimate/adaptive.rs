@@ -85,7 +85,7 @@ pub struct Measured {
 }
 
 /// Errors that prevent an adapted mesh.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum AdaptError {
     /// The scene does not fit a mesh.
     #[error(transparent)]
@@ -118,6 +118,8 @@ pub enum AdaptError {
     #[error(transparent)]
     Petsc(#[from] PetscError),
 }
+
+debug_is_message!(AdaptError);
 
 impl AdaptError {
     /// The signal that ended a run, if there was one.
