@@ -51,7 +51,7 @@ def random_scenes(binary, out, seed, count):
 def main():
     parser = parser_of(__doc__, "bounds")
     parser.add_argument("names", nargs="*", metavar="NAME")
-    parser.add_argument("--random", type=int, default=150, metavar="N")
+    parser.add_argument("--random", type=int, default=350, metavar="N")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()

@@ -316,7 +316,7 @@ fn body_forces_narrower_than_triangles_have_their_resultant_and_moment_or_a_note
         .flat_map(|at| [0.1, 0.01, 1e-3, 1e-4, 1e-6].map(|width| (at, width)))
     {
         let strip = format!("if(abs(x - {at}) < {}, {}, 0)", 0.5 * width, 1.0 / width);
-        cases.push((strip, [1.0, at], 0.05));
+        cases.push((strip, [1.0, at], 3e-3));
     }
     // What depends on time is divided less, as it is integrated in each step.
     for (force, expected, tolerance) in cases {
