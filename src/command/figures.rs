@@ -158,7 +158,8 @@ impl<'a> LastFigures<'a> {
                 format!("{}{reason}", value.trim_end())
             };
             let change = (governing.value - of.value).abs();
-            let differs = change > DIFFERENT * scale[0].max(scale[1]);
+            let differs = change > DIFFERENT * scale[0].max(scale[1])
+                && plain(governing.value, digits) != plain(of.value, digits);
             differs.then(|| (of.label, value(), governing.time))
         })
     }

@@ -1,10 +1,12 @@
 //! Expressions in x, y and t, which are parsed once and evaluated often.
 
 mod breaks;
+mod degree;
 mod interval;
 mod parser;
 mod table;
 
+use degree::Rule;
 use interval::{Enclosure, Enclosure2};
 use parser::Parser;
 use serde::Deserialize;
@@ -107,7 +109,7 @@ enum Instruction {
     /// x, y or t, by its index.
     Variable(usize),
     Unary(fn(f64) -> f64, Enclosure),
-    Binary(fn(f64, f64) -> f64, Enclosure2),
+    Binary(fn(f64, f64) -> f64, Enclosure2, Rule),
     Compare(fn(&f64, &f64) -> bool),
     /// `if`.
     Choose,
@@ -192,7 +194,7 @@ impl Expression {
                 Number(value) => *value,
                 Variable(i) => variables[*i],
                 Unary(apply, _) => apply(stack[height]),
-                Binary(apply, _) => apply(stack[height], stack[height + 1]),
+                Binary(apply, ..) => apply(stack[height], stack[height + 1]),
                 Compare(holds) => truth(stack[height], stack[height + 1], |a, b| holds(&a, &b)),
                 Choose if stack[height].is_nan() => f64::NAN,
                 Choose => stack[height + if stack[height] != 0.0 { 1 } else { 2 }],

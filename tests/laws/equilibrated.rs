@@ -214,6 +214,12 @@ fn what_the_proof_leaves_out_is_named() {
         ("-1", "0", &[][..]),
         ("-1 - y", "0.001*x", &[]),
         ("-exp(3*y)", "0", &["loads vary within triangles"]),
+        // Bands and peaks between the nodes, jumps and kinks between and at them.
+        ("if(y > 0.51 and y < 0.511, -100, 0)", "0", &["loads vary within triangles"]),
+        ("-100*exp(-((y - 0.62)/0.003)^2)", "0", &["loads vary within triangles"]),
+        ("-min(y, 0.3)", "0", &["loads vary within triangles"]),
+        ("-min(y, 0.5) - x*y/2", "0", &[]),
+        ("if(y < 0.25, -1, -2)", "max(0, x - 0.5)", &[]),
         ("-1", "0.01*x^3", &["gaps or displacements vary between nodes"]),
     ] {
         for order in ORDERS {

@@ -60,6 +60,8 @@ const FALLS: f64 = 0.95;
 const MOST_SWEEPS: usize = 16;
 /// The sweeps over the stars at the interfaces of ranks. With them two and three ranks print nearly the bound of one.
 const INTERFACE_SWEEPS: usize = 4;
+/// Functions may jump at vertices: this part of a triangle or of a side at its ends does not count.
+const AT_JUMP: f64 = 1e-9;
 /// The residual of the correction w, relative to all forces.
 const CORRECTION: f64 = 0.1 * IMBALANCE;
 
@@ -418,35 +420,33 @@ fn joined(body: &Body, before: &[SideForces], after: &[SideForces], part: f64) -
     before.iter().zip(&summed(body, changes)).map(|pair| of(pair, part)).collect()
 }
 
-/// What the proof leaves out: functions of the scene that are no polynomials of the degrees that it takes, along the sides of
-/// the triangles. Collective.
+/// What the proof leaves out: functions of the scene that are no polynomials of the degrees that it takes in the triangles and on
+/// their sides. Collective.
 fn left_out(problem: &DiscreteProblem, edges: &[ContactEdge], time: f64) -> Vec<&'static str> {
     let (body, scene) = (&problem.body, problem.scene());
-    let degree = if body.order() == Order::Quadratic { 2 } else { 1 };
-    let point = |vertex: usize| Vector2::from(body.mesh.nodes[vertex]);
-    // Differences of one more order than the degree, which vanish for a polynomial.
-    let differs = |f: &Expression, ends: [usize; 2], degree: usize| {
-        let weights: &[f64] =
-            [&[1.0, -1.0][..], &[1.0, -2.0, 1.0], &[1.0, -3.0, 3.0, -1.0]][degree];
-        let values = Vec::from_iter((0..=degree + 1).map(|k| {
-            let s = k as f64 / (degree + 1) as f64;
-            let x = point(ends[0]) * (1.0 - s) + point(ends[1]) * s;
-            f.eval(x.x, x.y, time)
-        }));
-        let size = values.iter().fold(0.0, |most, value| f64::max(most, value.abs()));
-        values.iter().zip(weights).map(|(value, w)| value * w).sum::<f64>().abs() > 1e-8 * size
+    let degree = body.order() as u32 + 1;
+    // Is f a polynomial of at most the `degree` between these vertices? It may have jumps at them.
+    let varies = |f: &Expression, vertices: &[usize], degree: u32| {
+        let range = |k: usize| {
+            let values = vertices.iter().map(|vertex| body.mesh.nodes[*vertex][k]);
+            let [low, high] = values
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                    [low.min(value), high.max(value)]
+                });
+            let within = AT_JUMP * (high - low);
+            [low + within, high - within]
+        };
+        f.degree([range(0), range(1), [time; 2]]).is_none_or(|of| of > degree)
     };
     let (mut loads, mut values) = (false, false);
-    for force in scene.body_force.iter().filter(|force| force.depends_on_space()) {
-        let mut sides = body.mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c]]);
-        loads |= sides.any(|ends| differs(force, ends, degree - 1));
+    for force in &scene.body_force {
+        loads |= body.mesh.triangles.iter().any(|triangle| varies(force, triangle, degree - 1));
     }
     for part in &scene.boundaries {
         for condition in &part.conditions {
-            let functions = condition.expressions().into_iter().flatten();
-            for function in functions.filter(|function| function.depends_on_space()) {
+            for function in condition.expressions().into_iter().flatten() {
                 let mut edges = body.mesh.edges_of(&part.name).iter();
-                let found = edges.any(|&ends| differs(function, ends, degree));
+                let found = edges.any(|ends| varies(function, ends, degree));
                 *(if condition.is_support() { &mut values } else { &mut loads }) |= found;
             }
         }

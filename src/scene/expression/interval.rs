@@ -7,7 +7,7 @@
 
 use super::{
     Expression, HIGHEST,
-    Instruction::{Binary, Choose, Compare, Number, Table, Unary, Variable},
+    Instruction::{self, Binary, Choose, Compare, Number, Table, Unary, Variable},
     truth,
 };
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -49,23 +49,28 @@ impl Expression {
         let mut height = 0;
         for instruction in &self.program {
             height -= instruction.takes();
-            let first = stack[height];
-            stack[height] = match instruction {
-                Number(value) => hull([*value]),
-                Variable(i) => variables[*i],
-                Unary(apply, enclose) => enclose(*apply, first),
-                Binary(apply, enclose) => enclose(*apply, first, stack[height + 1]),
-                Compare(holds) => compared(*holds, first, stack[height + 1]),
-                Choose => match first {
-                    [0.0, 0.0] => stack[height + 2],
-                    [a, b] if a > 0.0 || b < 0.0 => stack[height + 1],
-                    _ => hull([stack[height + 1], stack[height + 2]].concat()),
-                },
-                Table(table) => hull(table.within(first)),
-            };
+            stack[height] = instruction.enclosed(variables, &stack[height..]);
             height += 1;
         }
         stack[0]
+    }
+}
+
+impl Instruction {
+    /// Bounds on its value, from bounds on the variables and on its arguments.
+    pub(super) fn enclosed(&self, variables: [Interval; 3], arguments: &[Interval]) -> Interval {
+        match (self, arguments) {
+            (Number(value), _) => hull([*value]),
+            (Variable(i), _) => variables[*i],
+            (Unary(apply, enclose), [a, ..]) => enclose(*apply, *a),
+            (Binary(apply, enclose, _), [a, b, ..]) => enclose(*apply, *a, *b),
+            (Compare(holds), [a, b, ..]) => compared(*holds, *a, *b),
+            (Choose, [[0.0, 0.0], _, otherwise, ..]) => *otherwise,
+            (Choose, [[low, high], then, ..]) if *low > 0.0 || *high < 0.0 => *then,
+            (Choose, [_, a, b, ..]) => hull([*a, *b].concat()),
+            (Table(table), [a, ..]) => hull(table.within(*a)),
+            _ => EVERYTHING,
+        }
     }
 }
 

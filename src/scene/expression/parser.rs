@@ -3,7 +3,7 @@
 use super::{
     DEEPEST, Expression,
     Instruction::{self, Binary, Choose, Compare, Number, Unary, Variable},
-    MAX_LENGTH, Scope, Shape, Table, interval, truth,
+    MAX_LENGTH, Rule, Scope, Shape, Table, interval, truth,
 };
 use crate::suggestion::suggestion;
 use std::{
@@ -25,9 +25,15 @@ const NAMES: [(&str, Instruction); 15] = [
     ("exp", Unary(f64::exp, interval::monotone)),
     ("log", Unary(f64::ln, interval::from_zero)),
     ("abs", Unary(f64::abs, interval::absolute)),
-    ("min", Binary(|a, b| if a < b || a.is_nan() { a } else { b }, interval::corners)),
-    ("max", Binary(|a, b| if a > b || a.is_nan() { a } else { b }, interval::corners)),
-    ("atan2", Binary(f64::atan2, interval::angle)),
+    (
+        "min",
+        Binary(|a, b| if a < b || a.is_nan() { a } else { b }, interval::corners, Rule::Smaller),
+    ),
+    (
+        "max",
+        Binary(|a, b| if a > b || a.is_nan() { a } else { b }, interval::corners, Rule::Larger),
+    ),
+    ("atan2", Binary(f64::atan2, interval::angle, Rule::Other)),
     ("if", Choose),
 ];
 /// The end of a message about a constant that cannot be evaluated.
@@ -40,19 +46,29 @@ const TABLES: [(&str, Shape); 3] =
 /// right operand: `a - b - c` groups from the left, `a^b^c` from the right. A longer operator stands before
 /// the shorter one with which it begins.
 const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
-    ("or", Binary(|a, b| truth(a, b, |a, b| a != 0.0 || b != 0.0), interval::logical), 1, 2),
-    ("and", Binary(|a, b| truth(a, b, |a, b| a != 0.0 && b != 0.0), interval::logical), 2, 3),
+    (
+        "or",
+        Binary(|a, b| truth(a, b, |a, b| a != 0.0 || b != 0.0), interval::logical, Rule::Other),
+        1,
+        2,
+    ),
+    (
+        "and",
+        Binary(|a, b| truth(a, b, |a, b| a != 0.0 && b != 0.0), interval::logical, Rule::Other),
+        2,
+        3,
+    ),
     ("<=", Compare(f64::le), 3, 4),
     (">=", Compare(f64::ge), 3, 4),
     ("==", Compare(f64::eq), 3, 4),
     ("!=", Compare(f64::ne), 3, 4),
     ("<", Compare(f64::lt), 3, 4),
     (">", Compare(f64::gt), 3, 4),
-    ("+", Binary(|a, b| a + b, interval::corners), 4, 5),
-    ("-", Binary(|a, b| a - b, interval::corners), 4, 5),
-    ("*", Binary(|a, b| a * b, interval::corners), 5, 6),
-    ("/", Binary(|a, b| a / b, interval::quotient), 5, 6),
-    ("^", Binary(f64::powf, interval::power), 6, 6),
+    ("+", Binary(|a, b| a + b, interval::corners, Rule::Sum), 4, 5),
+    ("-", Binary(|a, b| a - b, interval::corners, Rule::Sum), 4, 5),
+    ("*", Binary(|a, b| a * b, interval::corners, Rule::Product), 5, 6),
+    ("/", Binary(|a, b| a / b, interval::quotient, Rule::Quotient), 5, 6),
+    ("^", Binary(f64::powf, interval::power, Rule::Power), 6, 6),
 ];
 /// What may follow a number, in messages.
 const AN_OPERATOR: &str = "a decimal point, an operator (`*`, `^`, `==`, `and`, `or`, …)";
@@ -117,7 +133,8 @@ impl<'a> Parser<'a> {
         }
         if self.take("-") {
             self.expression(SIGN)?;
-            self.push(Unary(|a| -a, interval::monotone));
+            self.push(Number(-1.0));
+            self.push(Binary(|a, b| a * b, interval::corners, Rule::Product));
         } else if self.take("+") {
             self.expression(SIGN)?;
         } else {
