@@ -36,9 +36,12 @@ pub fn kinks(scene: &Scene, mesh: &Mesh, accuracy: f64) -> Vec<(f64, Kink)> {
 /// # Errors
 /// gmsh cannot mesh the `.geo`.
 pub fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, MeshError> {
-    /// Triangles along the body, and the most of them where fewer are folded by the curved sides of a hole.
+    /// Triangles along the body, and the most of them where fewer are folded by the curved sides of a hole, or are slivers between the
+    /// small sizes at a point and the large ones beside it.
     const CELLS: f64 = 4.0;
     const MOST_CELLS: f64 = 64.0;
+    /// A mesh with a smaller angle, over that of the usual mesh, has slivers. Bisection keeps them.
+    const THINNER: f64 = 0.25;
     /// Meshes that are graded towards angles, as the third power holds for small ones, corners stay, and gmsh may fail.
     const GRADINGS: usize = 8;
     let MeshSource { file, parameters } = &scene.mesh;
@@ -49,10 +52,12 @@ pub fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, MeshError> {
         parameters.insert("size".to_owned(), mesh::extent(&usual.nodes) / scaling / cells);
         mesh::load(file, &parameters, Order::Quadratic)
     };
+    let thin = THINNER * usual.smallest_angle().0;
     let mut cells = CELLS;
     let mut first = loop {
         match of_cells(cells) {
             Err(MeshError::File { .. }) if cells < MOST_CELLS => cells *= 2.0,
+            Ok(mesh) if cells < MOST_CELLS && mesh.smallest_angle().0 < thin => cells *= 2.0,
             made => break made?,
         }
     };
