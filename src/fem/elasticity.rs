@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 /// Stresses, internal forces and energies of a displacement field, triangle by triangle. `zeta` are the values of ζ at the
 /// quadrature points, [`Body::at_points`].
 ///
-/// Solvers use [`Self::sums`]. The certificate and the error estimates use the other methods, which share no code with it.
+/// Solvers use its sums over elements. The certificate and the error estimates use the other methods, which share no code with it.
 #[derive(Debug, Clone, Default)]
 pub struct Elasticity {
     /// The materials by their numbers, and A of each as the matrix D of [`Material::stiffness`], Pa.
