@@ -309,6 +309,35 @@ fn a_hole_of_any_size_begins_with_a_mesh_whose_triangles_are_not_folded() {
     }
 }
 
+/// A bracket with a point of 0.5 mm beside sizes of 25 mm: with twice these sizes gmsh makes a triangle of less than 1°, which
+/// bisection keeps.
+#[test]
+fn an_accuracy_begins_without_slivers() {
+    let directory = TestDirectory::new();
+    directory.write(
+        "bracket.geo",
+        "DefineConstant[ size = 25 ];
+         Point(1) = {0,0,0,size}; Point(2) = {150,0,0,size}; Point(3) = {150,30,0,size*0.3};
+         Point(4) = {40,30,0,0.5}; Point(5) = {40,200,0,size*0.4}; Point(6) = {0,200,0,size*0.4};
+         Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,5}; Line(5) = {5,6}; Line(6) = {6,1};
+         Curve Loop(1) = {1:6}; Plane Surface(1) = {1}; Physical Surface(\"body\") = {1};
+         Physical Curve(\"wall\") = {5}; Physical Curve(\"tip\") = {2};\n",
+    );
+    directory.write(
+        "scene.toml",
+        "mesh = { file = 'bracket.geo', size = 25 }
+         material = { young = 210000, poisson = 0.3, plane = 'stress' }
+         boundary = [{ name = 'wall', displacement = [0, 0] }, { name = 'tip', traction = [0, -5] }]",
+    );
+    let said = directory.run(&["--accuracy", "0.03"]);
+    assert!(said.out.contains("accuracy 0.03 reached"), "{}{}", said.out, said.err);
+    assert!(!said.out.contains("has an angle of"), "{}", said.out);
+    let errors = &directory.summary("out/scene")["errors"];
+    let [bound, measured] =
+        ["displacement_bound", "displacement_mesh"].map(|name| errors[name].as_f64().unwrap());
+    assert!(bound < 2.0 * measured, "{bound} for {measured}");
+}
+
 /// Writes the scene of a homogeneous square bar on two symmetric sides, with this condition at its top.
 pub fn write_bar(directory: &TestDirectory, young: f64, damage: &str, top: &str) {
     directory.write(

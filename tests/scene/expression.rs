@@ -343,6 +343,58 @@ fn the_range_contains_all_values_in_a_box() {
 }
 
 #[test]
+fn differences_of_one_more_order_than_the_degree_vanish_on_all_lines() {
+    // Of a polynomial of degree d in x and y the differences of order d + 1 along any line are zero.
+    let mut random = Random::new(11);
+    let mut of_degree = [0; 4];
+    for _ in 0..4000 {
+        let depth = 1 + random.below(3);
+        let text = random_expression(&mut random, depth);
+        let f = Expression::parse(&text).unwrap_or_else(|e| panic!("`{text}` {e}"));
+        let space = [(); 2].map(|()| {
+            let from = 2.0 * random.next();
+            [from, from + [0.1, 2.0][random.below(2)]]
+        });
+        let t = random.next();
+        let Some(degree) = f.degree([space[0], space[1], [t, t]]).filter(|d| *d < 4) else {
+            continue;
+        };
+        of_degree[degree as usize] += 1;
+        let mut place = || space.map(|[from, to]| from + (0.5 + 0.5 * random.next()) * (to - from));
+        let (a, b) = (place(), place());
+        let count = degree as usize + 1;
+        let mut values = Vec::from_iter((0..=count).map(|k| {
+            let s = k as f64 / count as f64;
+            f.eval(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), t)
+        }));
+        let size = values.iter().fold(1e-300, |most, value| f64::max(most, value.abs()));
+        for _ in 0..count {
+            values = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        }
+        let is_zero = values[0].abs() <= 1e-9 * size || !values[0].is_finite();
+        assert!(is_zero, "`{text}` of degree {degree}: {values:?} of {size} in {space:?}");
+    }
+    assert!(of_degree[..3].iter().all(|count| *count > 10), "{of_degree:?}");
+    let degree = |text: &str, y: [f64; 2]| {
+        Expression::parse(text).unwrap().degree([[1.0, 2.0], y, [0.5; 2]])
+    };
+    for (text, inside, on_a_line) in [
+        ("x*y^2/3 - t*x", Some(3), Some(1)),
+        ("sin(y) + x^2", None, Some(2)),
+        ("max(x, 0) + min(y, 9)", Some(1), Some(1)),
+        ("if(x > 1.5, 1, 0)", None, None),
+        ("if(x < 3, x*x, sin(x))", Some(2), Some(2)),
+        ("1/x", None, None),
+    ] {
+        assert_eq!(
+            [degree(text, [0.0, 1.0]), degree(text, [1.0; 2])],
+            [inside, on_a_line],
+            "{text}"
+        );
+    }
+}
+
+#[test]
 fn the_range_is_sharp_where_each_variable_occurs_once() {
     let range = |text: &str, x: [f64; 2]| {
         Expression::parse(text).expect(text).range([x, [0.5, 0.5], [0.0, 0.0]])
