@@ -135,8 +135,8 @@ impl AdaptError {
 ///
 /// Tuned on the 13 adapted runs. Half: 1 % more triangles. Twice: 2 % fewer, a quarter fewer for `square`.
 const FEW_STEP_TOLERANCE: f64 = 0.05;
-/// The tolerance of the time steps is found on the first mesh with at most this estimated error of u. On coarser ones the
-/// contact and the damage are other ones.
+/// The tolerance of the time steps is found on the first mesh with at most this estimated error of u. On a coarser mesh,
+/// contact and damage differ too much from those of the last mesh.
 const MESH_FOR_STEPS: f64 = 0.1;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 25;
@@ -354,7 +354,7 @@ fn set_steps(
     grid.stepping = Stepping::Auto { tolerance, expected: adapted.damage };
     let mut problem = DiscreteProblem::new(scene, mesh.clone())?.restrict(session)?;
     let mut steps = tolerance;
-    // The accuracy may leave the steps hardly anything.
+    // If the mesh uses nearly the whole accuracy, the tolerance would become ever smaller.
     while steps >= tolerance / 64.0 {
         problem.set_step_tolerance(steps);
         let run = Simulation::new(&problem).choices(choices).run(session);

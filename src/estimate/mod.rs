@@ -8,6 +8,8 @@
 //! - [`Measured`]: the error bar of each printed figure, measured by the same run on three meshes;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
+//! For the error of u from the mesh there is also a proved bound, from an [`EquilibratedStress`].
+//!
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
 //! bisection. A measurement ends the rounds.
 //!

@@ -99,7 +99,7 @@ impl DamageStep<'_> {
                 source: StepFailure::Source(source),
             };
             let phi = agreed(comm, phi.map_err(failed))?;
-            // Three minima are faster than one.
+            // Three minima that do not wait for each other are faster than one.
             let min = phi.iter().fold([0.0; 3], |min, phi| [0, 1, 2].map(|q| phi[q].min(min[q])));
             let min = comm.min(min.into_iter().fold(0.0, f64::min));
             let load = fem::source_load(body, problem.mass(), &phi);

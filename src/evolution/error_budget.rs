@@ -39,7 +39,7 @@ pub struct ErrorBudget {
 const NEGLIGIBLE_ERROR: f64 = 1e-9;
 
 impl ErrorBudget {
-    /// Sets the `measured` error of u from the mesh. An estimate that is larger stays, and so does a proved bound that is smaller.
+    /// Sets the error of u from the mesh to the `measured` one, but at least to its estimate, and at most to a proved bound.
     pub fn set_measured(&mut self, measured: f64) {
         let proved = self.displacement_bound.filter(|_| self.reservations.is_empty());
         let error = self.displacement_mesh.max(measured);

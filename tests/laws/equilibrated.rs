@@ -15,6 +15,23 @@ use signorini::{
 };
 use std::collections::HashMap;
 
+/// Damage that stays as it begins.
+fn lasting_damage(initial: &str) -> String {
+    format!(
+        "[damage]
+         diffusion = 1e-9
+         lambda_d = 0
+         lambda_u = 0
+         lambda_w = 0
+         strain_cap = 1
+         threshold = 0.01
+         initial = '{initial}'
+         [time]
+         end = 1e-6
+         step = 1e-6"
+    )
+}
+
 /// ‖v‖² of nodal v.
 fn square_norm(problem: &DiscreteProblem, zeta: &[f64], v: &[f64]) -> f64 {
     let zeta = problem.zeta_at_points(zeta);
@@ -183,19 +200,8 @@ fn materials_and_compressibility_and_damage_do_not_break_it() {
         bounds(layered(Mesh::rectangle(1.0, 1.0, 6, 6)), &text, 4.0);
     }
     // ζ from its threshold to 1: the damage stays as it begins.
-    let damage = "[damage]
-         diffusion = 1e-9
-         lambda_d = 0
-         lambda_u = 0
-         lambda_w = 0
-         strain_cap = 1
-         threshold = 0.01
-         initial = '0.02 + 0.98*x'
-         [time]
-         end = 1e-6
-         step = 1e-6";
     let material = "young = 100, poisson = 0.3, plane = 'stress'";
-    bounds(square(5), &clamped(material, damage), 3.0);
+    bounds(square(5), &clamped(material, &lasting_damage("0.02 + 0.98*x")), 3.0);
 }
 
 #[test]
@@ -344,17 +350,8 @@ fn the_stress_balances_the_loads_in_each_triangle_and_across_all_sides() {
             { name = 'left', displacement = [0, 0] },
             { name = 'bottom', gap = '0.002*x' },
             { name = 'right', traction = ['y', -1] },
-         ]
-         [damage]
-         diffusion = 1e-9
-         lambda_d = 0
-         lambda_u = 0
-         lambda_w = 0
-         strain_cap = 1
-         initial = '0.3 + 0.7*x'
-         [time]
-         end = 1e-6
-         step = 1e-6";
+         ]";
+    let text = format!("{text}\n{}", lasting_damage("0.3 + 0.7*x"));
     for degree in 1..=2 {
         let (mesh, text) =
             (layered(distorted(6)), format!("discretisation.displacement = {degree}\n{text}"));

@@ -46,14 +46,13 @@ pub(super) fn displacement(
     finer: &Refinement,
     fine: &FewStepRun,
 ) -> f64 {
-    let (before, after, size) = (coarse.strains(), fine.strains(), fine.energy());
+    let (before, after, size) = (coarse.strains(), fine.own_strains(), fine.energy());
     let (problem, comm) = (fine.problem, fine.problem.body.nodes.partition.comm());
     let (body, elasticity) = (&problem.body, &problem.elasticity);
     let zeta = problem.zeta_at_points(&fine.outcome.last.state.zeta);
     let per_triangle = zeta.len() / body.triangles.len();
     let square = |t: usize| {
-        let whole = body.global_triangles[t];
-        let parent = finer.parent_of_triangle[whole];
+        let parent = finer.parent_of_triangle[body.global_triangles[t]];
         let corners = mesh.triangles[parent].map(|node| mesh.nodes[node]);
         let gradients = *Triangle::new(corners).gradients();
         let difference = [0, 1, 2].map(|i| {
@@ -62,7 +61,7 @@ pub(super) fn displacement(
             let centroid = [0, 1].map(|k| corners.iter().map(|at| at[k]).sum::<f64>() / 3.0);
             let part = |[a, b]: [f64; 2]| 1.0 / 3.0 + a * (x - centroid[0]) + b * (y - centroid[1]);
             let strain = before[parent].iter().zip(gradients).map(|(of, g)| of * part(g));
-            after[whole][i] - strain.sum::<Vector3<f64>>()
+            after[t][i] - strain.sum::<Vector3<f64>>()
         });
         let sum = difference.iter().sum::<Vector3<f64>>();
         let products = difference.iter().chain([&sum]).map(|e| e * e.transpose());

@@ -132,12 +132,16 @@ impl<'a> FewStepRun<'a> {
         [0, 1, 2].map(|i| self.gathered(&own(i)))
     }
 
-    /// ε(u) at the end at the vertices of each triangle of the undivided mesh. Collective.
-    pub(super) fn strains(&self) -> Vec<[Vector3<f64>; 3]> {
+    /// ε(u) at the end at the vertices of each triangle of this rank.
+    pub(super) fn own_strains(&self) -> Vec<[Vector3<f64>; 3]> {
         let (body, state) = (&self.problem.body, &self.outcome.last.state);
         let strains = body.strains(&self.problem.strained(state).u);
-        let own = strains.chunks(strains.len() / body.triangles.len());
-        let own = Vec::from_iter(own.map(at_vertices));
+        strains.chunks(strains.len() / body.triangles.len()).map(at_vertices).collect()
+    }
+
+    /// The same for each triangle of the undivided mesh. Collective.
+    pub(super) fn strains(&self) -> Vec<[Vector3<f64>; 3]> {
+        let own = self.own_strains();
         let mut strains = vec![[Vector3::zeros(); 3]; self.history.squares.len()];
         for (i, component) in (0..3).flat_map(|i| (0..3).map(move |component| (i, component))) {
             let values = Vec::from_iter(own.iter().map(|strains| strains[i][component]));

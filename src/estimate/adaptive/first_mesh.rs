@@ -36,11 +36,11 @@ pub fn kinks(scene: &Scene, mesh: &Mesh, accuracy: f64) -> Vec<(f64, Kink)> {
 /// # Errors
 /// gmsh cannot mesh the `.geo`.
 pub fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, MeshError> {
-    /// Triangles along the body, and the most of them where fewer are folded by the curved sides of a hole, or are slivers between the
-    /// small sizes at a point and the large ones beside it.
+    /// Triangles along the body. Their number is doubled, at most up to the second value, while curved sides of a hole fold some of
+    /// them, or while some are slivers between a small size at a point and large sizes beside it.
     const CELLS: f64 = 4.0;
     const MOST_CELLS: f64 = 64.0;
-    /// A mesh with a smaller angle, over that of the usual mesh, has slivers. Bisection keeps them.
+    /// A mesh has slivers if its smallest angle is below this part of that of the usual mesh. Bisection keeps slivers.
     const THINNER: f64 = 0.25;
     /// Meshes that are graded towards angles, as the third power holds for small ones, corners stay, and gmsh may fail.
     const GRADINGS: usize = 8;

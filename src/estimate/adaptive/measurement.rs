@@ -4,7 +4,7 @@
 //! runs of a measurement take the same time steps, so that these cause no change.
 //!
 //! If the errors are too large, the answer on the bisected mesh serves the next mesh too. Only if its errors are then still too
-//! large, or its time steps others, this mesh is bisected itself.
+//! large, or if its time steps differ, this mesh is bisected itself.
 
 use super::{
     AdaptError, Measured,
@@ -159,7 +159,7 @@ impl Measurement {
     }
 
     /// The errors of the run `coarse` with this `answer` on a refinement of the measured mesh, the last one `before`, from the
-    /// same finer mesh. `None` for other time steps and for runs that stop. Collective.
+    /// same finer mesh. `None` if the time steps differ from those `before`, or if a run stops. Collective.
     pub(super) fn on_refined(
         &self,
         before: &[Level],
@@ -169,13 +169,13 @@ impl Measurement {
         let (finer, fine) = self.finer.as_ref().filter(|_| self.stop.is_none())?;
         let is_like = coarse.stop().is_none() && answer.times == before.last()?.times;
         let sequence = is_like.then(|| Sequence::new(before, answer, from_ref(fine), false))?;
-        // The estimates on the two meshes have the ratio of the errors.
+        // From this mesh to the one before, the error falls as its estimate does.
         let at_end = self.at_end * answer.error / before.last()?.error;
         let displacement = coarse.relative().0.max(at_end);
         let mut measured = Self { at_end, displacement, ..Self::default() };
         if coarse.problem.damage().is_some() {
             let [shares, largest] = damage(answer, finer, fine);
-            // The error left on the finer mesh is a part of that of the mesh before.
+            // The finer mesh has an error, too: about r times that of the mesh before.
             measured.damage = shares.iter().sum::<f64>().sqrt() + sequence.rate() * self.damage;
             measured.zeta = largest;
         }

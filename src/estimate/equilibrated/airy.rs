@@ -35,7 +35,7 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
             let edge = || boundary.get(&sorted([star.node, star.end(triangles, j)]));
             !is_boundary || edge().is_some_and(|edge| edge.known().is_empty())
         };
-        // The length of which φ is a multiple: any, but the same one in all triangles of the star.
+        // The unit of φ, a length. With another one in each triangle of the star, the tractions would jump between them.
         let length = star.triangles.first().map_or(1.0, |&(t, _)| triangles[t].area.sqrt());
         let has_centre = star.is_closed || (is_free(0) && is_free(count - 1));
         let size = of_centre + of_side * count;

@@ -93,7 +93,7 @@ impl<const R: usize, const D: usize> Composite<R, D> {
         let [a, b, c, d, e, f] = PAIRS.map(|at| metric[at]);
         let [p, q, r, s, t, u] = self.products[i].each_ref().map(|of| &of.as_slice()[..R * D]);
         let mut form = SMatrix::<f64, R, D>::zeros();
-        // One pass over all six.
+        // All six products are added in one pass over their entries, which is faster.
         for (k, sum) in form.as_mut_slice()[..R * D].iter_mut().enumerate() {
             *sum = a * p[k] + b * q[k] + c * r[k] + d * s[k] + e * t[k] + f * u[k];
         }
@@ -131,7 +131,7 @@ impl<const R: usize, const D: usize> Composite<R, D> {
         let forces = on.sides.iter().flat_map(|side| &side[..used]).chain(&on.body);
         let forces = forces.flat_map(|force| <[f64; 2]>::from(on.frame.inverse * force));
         let mut stresses = SVector::<f64, VALUES>::zeros();
-        // Most scenes have no body force.
+        // Without a body force, the columns of its forces are left out.
         let columns = self.stresses.as_slice().chunks_exact(VALUES).zip(forces);
         for (column, force) in columns.filter(|(_, force)| *force != 0.0) {
             let sums = stresses.as_mut_slice().iter_mut().zip(column);

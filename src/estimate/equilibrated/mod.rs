@@ -48,7 +48,7 @@ pub struct ProvedError {
 /// The reason why a run has no bound, as a part of a sentence.
 pub type Unproved = &'static str;
 
-/// Without balance, forces up to this fraction of all forces are rounding, or the residual of the correction.
+/// An imbalance of the stars up to this fraction of all forces is rounding, or the residual of the correction.
 const IMBALANCE: f64 = 1e-7;
 /// A bound of this many times the estimate is good enough.
 const ENOUGH: f64 = 2.0;
@@ -60,7 +60,7 @@ const FALLS: f64 = 0.95;
 const MOST_SWEEPS: usize = 16;
 /// The sweeps over the stars at the interfaces of ranks. With them two and three ranks print nearly the bound of one.
 const INTERFACE_SWEEPS: usize = 4;
-/// Functions may jump at vertices: this part of a triangle or of a side at its ends does not count.
+/// Functions may jump at vertices, so this part of a triangle or of a side at its ends does not count.
 const AT_JUMP: f64 = 1e-9;
 /// The residual of the correction w, relative to all forces.
 const CORRECTION: f64 = 0.1 * IMBALANCE;
@@ -104,7 +104,7 @@ pub struct EquilibratedStress<'a> {
     /// ζ at the vertices, and the strains of an admissible u_h at the quadrature points.
     zeta: Vec<f64>,
     strains: Vec<Vector3<f64>>,
-    /// The energy norms of the computed u, and of what makes it admissible.
+    /// The energy norms of the computed u, and of the displacement that makes it admissible.
     norm: f64,
     of_moved: f64,
 }
@@ -257,7 +257,7 @@ impl<'a> EquilibratedStress<'a> {
         self.edges.iter().map(|edge| (edge.ends(), edge.coefficients()))
     }
 
-    /// Triangle `t` with what acts on it.
+    /// Triangle `t` with its strains, its ζ and the forces on it.
     fn loaded(&self, t: usize) -> LoadedTriangle<'_> {
         let (problem, triangle) = (self.problem, &self.triangles[t]);
         let per_triangle = self.strains.len() / self.triangles.len();

@@ -29,7 +29,7 @@ const ANNOUNCED: f64 = 1e6;
 
 /// gmsh's expressions for the width and the height of the box around the geometry, after `BoundingBox;`.
 pub const SIDES_OF_BOX: &str = "General.MaxX - General.MinX, General.MaxY - General.MinY";
-/// And for the number of squares in it whose side is the largest size.
+/// gmsh's expression for the number of squares in this box whose side is the largest size.
 pub const SQUARES: &str =
     "(General.MaxX - General.MinX) * (General.MaxY - General.MinY) / Mesh.MeshSizeMax^2";
 /// The equilateral triangles of this side that fill a square: 4/√3.

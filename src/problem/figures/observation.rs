@@ -27,7 +27,7 @@ pub(crate) struct Observation<'a> {
     /// The largest von Mises stress, the largest σ₁ and the smallest σ₂, Pa: first those of the body, then those of each
     /// material if there are several.
     pub stresses: Vec<[Value; 3]>,
-    /// From which the stresses are made; without strains if the body only moves rigidly.
+    /// What the stresses are made from. The strains are zero if the body only moves rigidly.
     pub strained: Strained,
     /// The figures of Γ_C, then those of each foundation.
     pub contact: Vec<ContactFigures>,

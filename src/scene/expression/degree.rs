@@ -1,7 +1,7 @@
 //! The degree of an expression as a polynomial in x and y, by its form.
 //!
-//! Values at some points do not tell it: a load may vary between them. Bounds on the arguments decide which argument `min`, `max`,
-//! `abs` and `if` take. What depends on space in any other way, as `exp(x)`, is no polynomial.
+//! Values at some points do not tell it: a load may vary between them. Bounds on the arguments decide which argument `min`, `max`
+//! and `if` take. What depends on space in any other way, as `exp(x)`, is no polynomial.
 
 use super::{
     Expression,
