@@ -5,7 +5,8 @@
 //! is made for an accuracy, and a run on it prints the figures with their bars.
 
 use signorini::{
-    estimate::{Simulation, adapted},
+    accuracy::adapted,
+    estimate::Simulation,
     evolution::Choices,
     mesh::Mesh,
     model::{DamagePoint, DamageSource},

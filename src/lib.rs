@@ -105,6 +105,7 @@ pub mod scene;
 pub mod problem;
 pub mod evolution;
 pub mod estimate;
+pub mod accuracy;
 pub mod output;
 
 /// The program in the README compiles.

@@ -3,7 +3,7 @@
 use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, screen::row};
 use comfy_table::presets;
 use signorini::{
-    estimate::INSTANTS,
+    accuracy::INSTANTS,
     mesh::{Mesh, extent},
     model::{Material, Plane},
     output::terminal::{self, plain, say},

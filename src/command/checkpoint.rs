@@ -7,7 +7,7 @@
 use super::{Failure, ranks::agree, task::Task};
 use serde::{Deserialize, Serialize};
 use signorini::{
-    estimate::{Adapted, Measured},
+    accuracy::LoopState,
     evolution::RunState,
     output::{self, FieldsWritten, OutputError},
     petsc::Communicator,
@@ -21,17 +21,14 @@ use std::{
 };
 
 /// The first line of a file.
-const FORMAT: &[u8] = b"signorini checkpoint 6\n";
+const FORMAT: &[u8] = b"signorini checkpoint 7\n";
 
 /// The state of a run between two steps.
 #[derive(Serialize, Deserialize)]
 pub struct Checkpoint {
     ranks: usize,
     origin: [u64; 3],
-    /// The adapted mesh and its errors.
-    pub adapted: Option<Adapted>,
-    /// In a repetition with shorter steps: the errors of the mesh, and the notes.
-    pub repeated: Option<(Measured, Vec<String>)>,
+    pub accuracy: LoopState,
     pub recorded: Recorded,
     pub run: RunState,
 }
@@ -123,11 +120,10 @@ fn refusal(path: &Path, reason: &str) -> Failure {
 /// Writes a checkpoint that replaces the previous one. Collective.
 pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), OutputError> {
     let (comm, folder) = (task.problem.body.nodes.partition.comm(), &task.folder);
-    let (step, adapted) = (run.last().record.step, task.adapted.clone());
+    let step = run.last().record.step;
     let path = path(folder, step, comm.rank());
-    let repeated = task.repeats.then(|| (task.measured.clone(), task.notes.clone()));
-    let checkpoint =
-        Checkpoint { ranks: comm.size(), origin: origin(task), adapted, repeated, recorded, run };
+    let (accuracy, origin) = (task.accuracy.clone(), origin(task));
+    let checkpoint = Checkpoint { ranks: comm.size(), origin, accuracy, recorded, run };
     let write = || {
         let content = postcard::to_stdvec(&checkpoint).map_err(|e| OutputError::new(&path, e))?;
         let file = [FORMAT, &hash(&content).to_le_bytes(), &content].concat();

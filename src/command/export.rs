@@ -1,6 +1,6 @@
 //! `signorini export`: the matrices of a step in the plain nodal unknowns, for programs of other authors.
 
-use super::{Failure, SceneArguments, accuracy, read_mesh, require_one_process, screen};
+use super::{Failure, SceneArguments, read_mesh, require_one_process, run::accuracy_loop, screen};
 use clap::Args;
 use serde_json::json;
 use signorini::{
@@ -48,8 +48,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let ExportArguments { scene, time, out } = arguments;
     let (mut scene, _) = scene.read(&[])?;
     let mesh = read_mesh(&scene, true)?;
-    let adapted = accuracy::adapt(session, &mut scene, &mesh, None)?;
-    let mesh = adapted.map_or(mesh, |adapted| adapted.mesh);
+    let (_, mesh) = accuracy_loop(session, &mut scene, mesh, (false, None))?;
     let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut states = Vec::new();
     let mut keep = |step: &Step| {

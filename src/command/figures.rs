@@ -3,7 +3,7 @@
 use super::task::Task;
 use serde::Serialize;
 use signorini::{
-    estimate::Extreme,
+    accuracy::Extreme,
     evolution::{GoverningValue, Outcome, Step},
     mesh::Mesh,
     output::terminal::{plain, with_bar},
@@ -62,7 +62,7 @@ impl<'a> LastFigures<'a> {
         extremes: &[Extreme],
         outcome: Option<&Outcome>,
     ) -> Self {
-        let (problem, measured) = (&task.problem, &task.measured);
+        let (problem, measured) = (&task.problem, &task.accuracy.measured);
         let units = &problem.scene().units;
         let bars = outcome.map_or(&[][..], |outcome| &outcome.bars);
         let figure = |(i, figure): (usize, &'a Figure)| {
@@ -81,7 +81,7 @@ impl<'a> LastFigures<'a> {
             }
         };
         let is_measured =
-            task.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
+            task.accuracy.adapted.is_some() || !measured.bars.is_empty() || measured.stop.is_some();
         let error = outcome.map_or(0.0, |outcome| outcome.errors.displacement_mesh);
         let of_stress = (1.0 - error.log10()).ceil().clamp(2.0, 5.0) as usize;
         Self {

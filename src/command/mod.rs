@@ -6,7 +6,6 @@
 //! What crosses the door: `main` calls one function per subcommand. It returns a [`Failure`] with an exit code and
 //! a message for the person at the terminal.
 
-mod accuracy;
 mod check;
 mod checkpoint;
 mod export;
@@ -32,8 +31,8 @@ pub use script::{ScriptArguments, script};
 use clap::Args;
 use ranks::require_one_process;
 use signorini::{
+    accuracy,
     contact::{REGISTRY, SOLVERS, TAO_TYPES},
-    estimate,
     interrupt::{Signal, received},
     mesh::{self, Format, Mesh},
     output::terminal::say,
@@ -203,7 +202,7 @@ fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
     let MeshSource { file, parameters } = &scene.mesh;
     let is_adapted = adapts && Format::of(file) == Some(Format::Geometry);
     let mesh = match scene.accuracy.filter(|_| is_adapted) {
-        Some(accuracy) => estimate::first_mesh(scene, accuracy),
+        Some(accuracy) => accuracy::first_mesh(scene, accuracy),
         None => mesh::load(file, parameters, scene.order),
     };
     let mut mesh = mesh.map_err(Failure::input)?;

@@ -1,7 +1,6 @@
 //! Writes the results of a run and shows its progress.
 
 use super::{
-    accuracy,
     checkpoint::{self, Checkpoint, Recorded},
     figures::LastFigures,
     profile, screen,
@@ -10,7 +9,7 @@ use super::{
 };
 use serde_json::json;
 use signorini::{
-    estimate::Extremes,
+    accuracy::{Extremes, notes_on_extremes},
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::received,
     memory,
@@ -77,7 +76,7 @@ impl<'a> Recorder<'a> {
 
     /// Removes the results of an earlier run and writes the scene of this one.
     fn start(&mut self) -> Result<(), OutputError> {
-        let Task { folder, as_run, adapted, .. } = self.task;
+        let Task { folder, as_run, accuracy, .. } = self.task;
         let mesh = self.task.problem.scene().mesh.file.as_path();
         let copied = as_run.copies.iter().map(|(_, file)| file.as_path());
         output::prepare(folder, &Vec::from_iter(copied.chain([mesh])))?;
@@ -85,7 +84,7 @@ impl<'a> Recorder<'a> {
         for (name, file) in &as_run.copies {
             output::copy(file, &folder.join(name), &as_run.copies)?;
         }
-        if let Some(mesh) = adapted {
+        if let Some(mesh) = &accuracy.adapted {
             let text = mesh.mesh.to_msh() + output::ADAPTED;
             write_whole(&folder.join(output::MESH), text.as_bytes())?;
         }
@@ -158,7 +157,7 @@ impl<'a> Recorder<'a> {
         let written = written.and(task.phases.time("output", || self.fields.complete()));
         let problem = &task.problem;
         let extremes = last.iter().map(|step| {
-            Extremes::of(problem, &step.state, &step.figures, &task.measured)
+            Extremes::of(problem, &step.state, &step.figures, &task.accuracy.measured)
                 .map_err(|error| OutputError::new(Path::new("the extreme stresses"), error))
         });
         let (written, extremes) = match extremes.collect::<Result<Vec<_>, _>>() {
@@ -167,8 +166,7 @@ impl<'a> Recorder<'a> {
         };
         let outcome = result.as_ref().ok();
         let mut notes = notes(task, outcome);
-        notes.extend(last.iter().filter_map(|step| accuracy::hidden_damage(task, step, &extremes)));
-        notes.extend(accuracy::kinks_of_table(&extremes));
+        notes.extend(last.iter().flat_map(|step| notes_on_extremes(problem, step, &extremes)));
         let warnings = notes.len();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         if result.is_ok() {
@@ -222,14 +220,9 @@ impl Observer for Recorder<'_> {
 
 /// The notes on a run, except remarks. Collective.
 fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
-    let of_accuracy = [
-        accuracy::accuracy_note(task, outcome).map(|(_, note)| note),
-        accuracy::kink_note(task),
-        outcome
-            .filter(|_| task.adapted.is_none())
-            .and_then(|run| accuracy::missing_bars(task, run)),
-    ];
-    let of_task = task.notes.iter().cloned().chain(task.problem.notes());
-    let of_run = outcome.into_iter().flat_map(|outcome| outcome.notes(&task.problem));
-    of_accuracy.into_iter().flatten().chain(of_task).chain(of_run).collect()
+    let Task { problem, accuracy, notes, .. } = task;
+    let of_accuracy = accuracy.notes(problem, outcome).into_iter();
+    let of_task = notes.iter().cloned().chain(problem.notes());
+    let of_run = outcome.into_iter().flat_map(|outcome| outcome.notes(problem));
+    of_accuracy.chain(of_task).chain(of_run).collect()
 }

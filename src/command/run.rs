@@ -2,7 +2,6 @@
 
 use super::{
     Failure, SOLVERS, SceneArguments,
-    accuracy::{adapt, confirm_stop, has_time, measure_errors},
     check::contact_nodes,
     check_petsc,
     checkpoint::Checkpoint,
@@ -15,7 +14,8 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    estimate::{Measured, Simulation},
+    accuracy::{AdaptError, LoopState},
+    estimate::Simulation,
     evolution::{Outcome, Phases, RunError},
     interrupt::Interrupts,
     linear::LinearSolver,
@@ -26,6 +26,7 @@ use signorini::{
     scene::Scene,
 };
 use std::{
+    mem,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -160,29 +161,23 @@ fn read<'a>(
     started: Instant,
 ) -> Result<(Task<'a>, Option<Checkpoint>), Failure> {
     let comm = session.comm();
-    let (mut scene, mut notes) = agree(comm, arguments.read())?;
+    let (mut scene, notes) = agree(comm, arguments.read())?;
     let mesh = phases.time("mesh", || read_shared(comm, &scene))?;
     let folder = arguments.folder(&scene);
     let as_run = scene.as_run();
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
     agree(comm, output::check_is_writable(&folder).map_err(Failure::input))?;
     let restart = arguments.restart.then(|| Checkpoint::read(comm, &folder));
-    let restart = restart.transpose()?.flatten();
+    let mut restart = restart.transpose()?.flatten();
     if arguments.restart && restart.is_none() && comm.is_root() {
         let folder = folder.display();
         tell("warning", &format!("{folder} has no checkpoint; the run begins at its start"));
     }
-    let made = restart.as_ref().and_then(|checkpoint| checkpoint.adapted.clone());
+    let saved = restart.as_mut().map(|checkpoint| mem::take(&mut checkpoint.accuracy));
     let _interrupts = Interrupts::defer();
-    let adapt = || adapt(session, &mut scene, &mesh, made);
-    let adapted = agree(comm, phases.time("adaptation", adapt))?;
-    let mesh = adapted.as_ref().map_or(mesh, |adapted| adapted.mesh.clone());
-    let measure = || measure_errors(session, &scene, &mesh, None, &mut notes);
-    let measured = match &adapted {
-        Some(adapted) => adapted.measured.clone(),
-        None if arguments.bars => agree(comm, phases.time("error bars", measure))?,
-        None => Measured::default(),
-    };
+    let phase = if scene.accuracy.is_some() { "adaptation" } else { "error bars" };
+    let start = || accuracy_loop(session, &mut scene, mesh, (arguments.bars, saved));
+    let (accuracy, mesh) = agree(comm, phases.time(phase, start))?;
     let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
     let problem = agree(comm, problem.map_err(Failure::input))?;
     let problem = phases.time("partition", || problem.restrict(session));
@@ -199,9 +194,7 @@ fn read<'a>(
         problem,
         folder,
         as_run,
-        adapted,
-        measured,
-        repeats: false,
+        accuracy,
         notes,
         _lock: lock,
         _interrupts,
@@ -222,42 +215,52 @@ fn solve(
 ) -> Result<(), Failure> {
     let checked = restart.as_ref().map_or(Ok(()), |checkpoint| checkpoint.check(&task));
     agree(session.comm(), checked)?;
-    let repeated = restart.as_mut().and_then(|checkpoint| checkpoint.repeated.take());
-    if let Some((measured, notes)) = repeated {
-        (task.repeats, task.measured, task.notes) = (true, measured, notes);
-        show_again(session.comm());
-    }
+    let comm = session.comm();
     loop {
+        if task.accuracy.repeats && comm.is_root() {
+            let text = "with shorter time steps, which the accuracy needs";
+            say(&screen::row("again", text.to_owned()));
+        }
         let started = Instant::now();
         let (recorder, result) = solve_once(&task, restart.take(), session)?;
-        // Lengths of steps are on a ladder of √2, and their errors are of second order: an error may be twice the one
-        // asked for.
-        let shorter =
-            |outcome: &Outcome| Some(0.5 * outcome.shorter_steps(&task.problem, &task.measured)?);
-        let ratio = result.as_ref().ok().and_then(shorter);
-        let seconds = session.comm().max(started.elapsed().as_secs_f64());
-        let ratio = ratio.filter(|ratio| has_time(&task, seconds, *ratio));
-        match (result, ratio) {
-            (Ok(outcome), Some(ratio)) if !task.repeats => {
+        let seconds = [task.started, started].map(|from| comm.max(from.elapsed().as_secs_f64()));
+        let Task { accuracy, problem, .. } = &task;
+        let shorter = |of: &Outcome| accuracy.shorter_steps(problem, of, seconds);
+        match result.as_ref().ok().and_then(shorter).zip(result.as_ref().ok()) {
+            Some((ratio, outcome)) => {
                 drop(recorder);
-                confirm_stop(session, &mut task, &outcome)?;
-                if let Some(adapted) = &mut task.adapted {
-                    adapted.steps *= ratio;
-                    task.problem.set_step_tolerance(adapted.steps);
-                }
-                task.repeats = true;
-                show_again(session.comm());
+                let Task { accuracy, problem, .. } = &mut task;
+                let repeated = accuracy.repeat(session, problem, outcome, ratio);
+                repeated.map_err(|error| failure(&error))?;
             }
-            (result, _) => return finish(recorder, result, session.comm()),
+            None => return finish(recorder, result, comm),
         }
     }
 }
 
-/// Shows that the run is a repetition.
-fn show_again(comm: Communicator) {
-    if comm.is_root() {
-        let text = "with shorter time steps, which the accuracy needs";
-        say(&screen::row("again", text.to_owned()));
+/// The accuracy loop up to the run that is written, whose meshes are shown; see [`LoopState::start`]. Collective.
+pub(super) fn accuracy_loop(
+    session: &Session,
+    scene: &mut Scene,
+    mesh: Mesh,
+    asked: (bool, Option<LoopState>),
+) -> Result<(LoopState, Mesh), Failure> {
+    let mut shown = screen::Adaptation::new(session.comm(), scene);
+    let made = LoopState::start(session, scene, mesh, asked, &mut |mesh| shown.add(mesh));
+    made.map_err(|error| failure(&error))
+}
+
+/// A failure of the accuracy loop: the input, or a signal during a run on a mesh that was only tried.
+fn failure(error: &AdaptError) -> Failure {
+    match (error, error.signal()) {
+        (AdaptError::Setup(_) | AdaptError::Overturns { .. }, _) => Failure::input(error),
+        (_, None) => error.into(),
+        (_, Some(signal)) => {
+            let message = format!(
+                "ended by {signal} while meshes were tried for the accuracy or the error bars"
+            );
+            Failure { code: signal.exit_code(), message: Some(message) }
+        }
     }
 }
 
@@ -278,7 +281,7 @@ fn solve_once<'a>(
     }
     let mut result = simulation.run(session);
     if let Ok(outcome) = &mut result {
-        outcome.set_bars(problem, &task.measured)?;
+        outcome.set_bars(problem, &task.accuracy.measured)?;
     }
     Ok((recorder, result))
 }

@@ -2,16 +2,18 @@
 
 use super::{figures::LastFigures, task::Task};
 use signorini::{
-    estimate::Adapted,
+    accuracy::Adapted,
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, plain, say, with_bar},
+    petsc::Communicator,
     problem::{Collapse, in_words},
-    scene::{Scheme, Stepping, TimeGrid, rounded},
+    scene::{Scene, Scheme, Stepping, TimeGrid, rounded},
 };
 use std::{
     io::{self, Write},
     num::NonZero,
     thread,
+    time::Instant,
 };
 
 /// The length of the progress bar: it counts parts of [0, T], as many as a run may have steps.
@@ -50,8 +52,31 @@ fn cores() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get)
 }
 
+/// Shows the meshes of the accuracy loop.
+pub struct Adaptation {
+    accuracy: Option<f64>,
+    started: Option<Instant>,
+}
+
+impl Adaptation {
+    /// Only the first rank shows them.
+    pub fn new(comm: Communicator, scene: &Scene) -> Self {
+        let accuracy = scene.accuracy.filter(|_| comm.is_root());
+        Self { accuracy, started: Some(Instant::now()) }
+    }
+
+    /// Shows a mesh with its errors, and after the first one what the following ones may need.
+    pub fn add(&mut self, mesh: &Adapted) {
+        let Some(accuracy) = self.accuracy else { return };
+        adapting(mesh, accuracy);
+        if let Some(started) = self.started.take() {
+            expected(mesh, accuracy, started.elapsed().as_secs_f64());
+        }
+    }
+}
+
 /// Shows a mesh of the adaptation with its errors.
-pub fn adapting(mesh: &Adapted, accuracy: f64) {
+fn adapting(mesh: &Adapted, accuracy: f64) {
     let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
     // The norms come first, and are not repeated.
     let worst = mesh.worst.iter().filter(|(name, _)| name != "damage" && name != "displacement");
@@ -70,7 +95,7 @@ pub fn adapting(mesh: &Adapted, accuracy: f64) {
 /// Shows what the rounds to come may need, after the first one has taken `seconds`. The error of quadratic elements on
 /// adapted meshes falls like 1/unknowns. The rounds to come take about fifteen times as long as the run on the last
 /// mesh, and 11 kB for each of its unknowns.
-pub fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
+fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
     let growth = (mesh.error.max(mesh.damage_error.unwrap_or(0.0)) / accuracy).max(1.0);
     let unknowns = growth * mesh.unknowns as f64;
     let (seconds, megabytes) = (15.0 * growth * seconds, 50.0 + 0.011 * unknowns);

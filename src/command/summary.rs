@@ -1,6 +1,6 @@
 //! `summary.json`: what a run has found, and what it cost.
 
-use super::{accuracy::accuracy_note, figures::LastFigure, provenance::provenance, task::Task};
+use super::{figures::LastFigure, provenance::provenance, task::Task};
 use serde_json::{Map, Value, json};
 use signorini::{
     evolution::{Outcome, RunError, StepRecord},
@@ -50,7 +50,7 @@ pub(super) fn summary(
         "units": scene.units,
         "notes": notes,
     });
-    if let Some((reached, _)) = accuracy_note(task, outcome) {
+    if let Some((reached, _)) = task.accuracy.conclusion(problem, outcome) {
         summary["reached"] = json!(reached);
     }
     if let Err(error) = result {

@@ -1,10 +1,7 @@
 //! The task of a run.
 
 use signorini::{
-    estimate::{Adapted, Measured},
-    evolution::Phases,
-    interrupt::Interrupts,
-    problem::DiscreteProblem,
+    accuracy::LoopState, evolution::Phases, interrupt::Interrupts, problem::DiscreteProblem,
     scene::AsRun,
 };
 use std::{fs::File, path::PathBuf, time::Instant};
@@ -20,13 +17,9 @@ pub struct Task<'a> {
     pub folder: PathBuf,
     /// The scene file in this folder.
     pub as_run: AsRun,
-    /// The adapted mesh, if there is one.
-    pub adapted: Option<Adapted>,
-    /// The measured errors of the mesh; empty if they were not measured.
-    pub measured: Measured,
-    /// Is this a repetition with shorter steps?
-    pub repeats: bool,
-    /// Notes on the arguments and on the error bars.
+    /// The adapted mesh and the measured errors.
+    pub accuracy: LoopState,
+    /// Notes on the arguments.
     pub notes: Vec<String>,
     /// The lock of the folder against other runs.
     pub _lock: Option<File>,

@@ -91,7 +91,7 @@ impl<'a> RecoveredStrains<'a> {
 
 /// A function at the vertices from its values at the quadrature points of a triangle, constant or
 /// affine between them: an affine f has the values f(x_q) = Σf/6 + f_q/2, so f_q = 2 f(x_q) − Σf/3.
-pub(super) fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {
+pub(crate) fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {
     match points {
         [value] => [*value; 3],
         _ => {

@@ -24,7 +24,7 @@ use std::mem::take;
 /// A note is given if more than this fraction of a load, a displacement or a damage is missed.
 pub(crate) const NOTED: f64 = 0.05;
 /// Approximate number of sample times of loads, for their maximum, and of what the mesh must resolve.
-pub(super) const SAMPLE_TIMES: usize = 8;
+pub(crate) const SAMPLE_TIMES: usize = 8;
 
 /// The nodal loads and the values of all rows, as functions of time.
 #[derive(Debug)]
@@ -130,7 +130,7 @@ impl Loads {
 
     /// The estimated errors of the integrals of all loads at some times: the largest one, N per metre of thickness, and
     /// relative to the largest Σ|f|. Collective.
-    pub(super) fn integral_errors(&self, body: &Body, times: &[f64]) -> [f64; 2] {
+    pub(crate) fn integral_errors(&self, body: &Body, times: &[f64]) -> [f64; 2] {
         let partition = &body.nodes.partition;
         let [mut error, mut size] = [0.0_f64; 2];
         for &t in times {

@@ -1,7 +1,7 @@
 //! Adapted meshes: the accuracy asked for is the accuracy got, with few triangles.
 
 use crate::support::{adapted, scene, solved, square, with_part};
-use signorini::{estimate::Adapted, mesh::Mesh, scene::Scene};
+use signorini::{accuracy::Adapted, mesh::Mesh, scene::Scene};
 
 /// A block under a load per area, on a foundation that ends under it: u ~ r^½ at the end, a jump of the traction besides.
 fn block(accuracy: f64, load: &str) -> Scene {

@@ -6,11 +6,12 @@ mod own_solver;
 use crate::support::*;
 use own_solver::ProjectedSor;
 use signorini::{
+    accuracy,
     contact::{
         ChosenSolver, ContactError, ContactProblem, ContactReport, ContactSolver, SharedSolver,
         solvers,
     },
-    estimate::{self, Simulation},
+    estimate::Simulation,
     evolution::{Choices, Next, Observed, Observer, Outcome, RunState, Step},
     linear::LinearSolver,
     model::{DamagePoint, DamageSource},
@@ -166,7 +167,7 @@ fn a_mesh_for_an_accuracy_and_its_bars_are_those_of_our_parts() {
     let text = "[[probe]]\nname = 'middle'\npoint = [0.5, 0.5]";
     let (scene, session) = (block(1, text), Session::start(&[]).unwrap());
     let adapted = |choices: &Choices| {
-        estimate::adapted(&session, &scene, square(4), choices, 0.1, &mut |_| {}).unwrap()
+        accuracy::adapted(&session, &scene, square(4), choices, 0.1, &mut |_| {}).unwrap()
     };
     let named = ChosenSolver::Named("penalty-duality".to_owned());
     let (solver, _) = solvers(&named, true, &scene.contact).unwrap();

@@ -2,8 +2,8 @@
 
 use crate::support::{problem, run, scene, square};
 use signorini::{
+    accuracy::{self, Measured},
     contact::SOLVERS,
-    estimate::{self, Measured},
     evolution::{Choices, Outcome},
     petsc::Session,
 };
@@ -11,7 +11,7 @@ use signorini::{
 /// The measured errors of a scene on a square of n × n cells.
 fn measured(text: &str, n: usize) -> Measured {
     let (scene, session) = (scene(text), Session::start(&[]).unwrap());
-    estimate::measured_errors(&session, &scene, &square(n), &Choices::of(&scene), None).unwrap()
+    accuracy::measured_errors(&session, &scene, &square(n), &Choices::of(&scene), None).unwrap()
 }
 
 /// A sheared square on a foundation.

@@ -4,8 +4,8 @@
 
 use crate::support::{distorted, history, problem, run, shipped};
 use signorini::{
+    accuracy,
     contact::SOLVERS,
-    estimate,
     evolution::{Choices, DiscreteProblem, Outcome},
     petsc::Session,
 };
@@ -115,7 +115,7 @@ fn with_bars(problem: &DiscreteProblem) -> (Outcome, Vec<f64>) {
     let (mesh, scene) = (distorted(2), problem.scene());
     let session = Session::start(&[]).unwrap();
     let measured =
-        estimate::measured_errors(&session, scene, &mesh, &Choices::of(scene), None).unwrap();
+        accuracy::measured_errors(&session, scene, &mesh, &Choices::of(scene), None).unwrap();
     drop(session);
     let (steps, mut outcome) = history(problem, SOLVERS[0]);
     outcome.set_bars(problem, &measured).expect("PETSc works");

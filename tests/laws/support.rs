@@ -7,8 +7,9 @@ pub use common::{Random, curved_area, square};
 
 use nalgebra::{Matrix2, Vector3};
 use signorini::{
+    accuracy::{self, Adapted},
     contact::SOLVERS,
-    estimate::{self, Adapted, Simulation},
+    estimate::Simulation,
     evolution::{Choices, DiscreteProblem, Outcome, RunError, SetupError, Step},
     mesh::{self, Curve, Mesh, Order},
     model::DamageLaw,
@@ -139,7 +140,7 @@ pub fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
     let session = Session::start(&[]).unwrap();
     let mut triangles = 0;
     let mut seen = |mesh: &Adapted| triangles = mesh.mesh.triangles.len();
-    let found = estimate::adapted(&session, scene, mesh, &Choices::of(scene), accuracy, &mut seen);
+    let found = accuracy::adapted(&session, scene, mesh, &Choices::of(scene), accuracy, &mut seen);
     let found = found.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(triangles, found.mesh.triangles.len(), "the last mesh shown is the answer");
     found

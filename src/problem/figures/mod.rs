@@ -114,7 +114,7 @@ pub struct Figure {
     pub dimension: Dimension,
     governing: Governing,
     /// Figures of one group share a scale: the components of a force, of a displacement, of a stress.
-    group: String,
+    pub(crate) group: String,
     value: Box<dyn Fn(&Observation) -> Value>,
 }
 

@@ -64,7 +64,7 @@ impl<'a> Observation<'a> {
     ///
     /// # Errors
     /// PETSc failed.
-    pub(super) fn new(
+    pub(crate) fn new(
         problem: &'a DiscreteProblem,
         state: &'a State,
         load: &[f64],

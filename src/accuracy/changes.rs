@@ -1,6 +1,6 @@
 //! The changes of the damage and of u between a mesh and a finer one.
 
-use super::{few_step_run::FewStepRun, sequence::Level, sizes::areas};
+use super::{Answer, FewStepRun, sizes::areas};
 use crate::{
     fem::Triangle,
     mesh::{Mesh, Refinement},
@@ -11,7 +11,7 @@ use std::collections::HashMap;
 /// Per triangle of the mesh that was bisected to `finer`: its share in the squared change ‖ζ_h − ζ_{h/2}‖² / ‖1 − ζ_{h/2}‖² at
 /// the end, and max |ζ_h − ζ_{h/2}|. ζ_h is the answer on the bisected mesh, or on a refinement of it: on an edge that this one does
 /// not halve, it is affine.
-pub(super) fn damage(coarse: &Level, finer: &Refinement, fine: &Level) -> [Vec<f64>; 2] {
+pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec<f64>; 2] {
     let place = |node: &[f64; 2]| node.map(f64::to_bits);
     let known: HashMap<_, _> = coarse.mesh.nodes.iter().map(place).zip(&coarse.zeta).collect();
     let old = finer.mesh.nodes.len() - finer.halved_edges.len();

@@ -1,6 +1,6 @@
 //! Why the mesh does not determine an extreme stress or pressure of a state, and where contact ends.
 
-use super::Measured;
+use super::{Measured, conclusion::KINKS_OF_TABLE};
 use crate::{
     model::von_mises,
     petsc::PetscError,
@@ -8,9 +8,6 @@ use crate::{
     scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
-
-/// Why a pressure is not resolved below a gap with a table of the place.
-pub const KINKS_OF_TABLE: &str = "the gap's table has kinks; spline(\"…\") is smooth";
 
 /// An extreme of a state.
 #[derive(Debug, Clone, PartialEq)]

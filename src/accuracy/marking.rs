@@ -1,8 +1,7 @@
-//! One round: is its mesh good enough to be measured, and how is the next one refined?
+//! MARK: are the estimates of a mesh small enough for a measurement, and how much smaller must its triangles become?
 
 use super::{
-    Adapted, Measured,
-    few_step_run::FewStepRun,
+    Adapted, End, FewStepRun, Measured,
     measurement::{Cause, Measurement},
     sizes::{divided, influences, sharpened, size_ratios, touching},
 };
@@ -21,7 +20,7 @@ use std::{collections::HashSet, mem::take};
 /// Tuned on the 13 adapted runs. Half: 12 runs miss their accuracy. Twice: 4 % fewer triangles, but a fifth more for
 /// `lshape-rolling`.
 const GOOD_ENOUGH: f64 = 0.8;
-/// If measured errors are too large, a round reduces the estimated errors by at most this factor: excesses on coarse
+/// If measured errors are too large, a new mesh reduces the estimated errors by at most this factor: excesses on coarse
 /// meshes are often far too large.
 ///
 /// Tuned on the 13 adapted runs. Half: 4 % more triangles. Twice: 11 % fewer, 6 % more meshes.
@@ -38,12 +37,11 @@ const MAX_SHARE_OF_STEPS: f64 = 0.5;
 /// two runs miss their accuracy.
 const HALF: f64 = 0.5;
 
-/// A mesh and a run with few steps on it.
-pub(super) struct Round<'a> {
-    scene: &'a Scene,
-    mesh: &'a Mesh,
+/// The estimated errors of a run with few steps on a mesh.
+pub(super) struct Estimate<'a> {
+    pub(super) mesh: &'a Mesh,
     pub(super) run: FewStepRun<'a>,
-    accuracy: f64,
+    pub(super) accuracy: f64,
     /// The estimated relative error of u at the worst time and its shares.
     pub(super) error: f64,
     shares: Vec<f64>,
@@ -57,9 +55,8 @@ pub(super) struct Round<'a> {
     singular: Vec<([f64; 2], f64)>,
 }
 
-impl<'a> Round<'a> {
+impl<'a> Estimate<'a> {
     pub(super) fn new(
-        scene: &'a Scene,
         mesh: &'a Mesh,
         run: FewStepRun<'a>,
         accuracy: f64,
@@ -73,11 +70,10 @@ impl<'a> Round<'a> {
         let singular = singular.collect();
         let displacement = run.displacement();
         Ok(Self {
-            unresolved: unresolved(scene, mesh, accuracy, displacement),
+            unresolved: unresolved(run.problem.scene(), mesh, accuracy, displacement),
             deepest: accuracy * displacement,
             open: run.open() / accuracy,
             singular,
-            scene,
             mesh,
             run,
             accuracy,
@@ -86,10 +82,15 @@ impl<'a> Round<'a> {
         })
     }
 
+    /// The scene with few time steps.
+    pub(super) fn scene(&self) -> &Scene {
+        self.run.problem.scene()
+    }
+
     /// Is the mesh good enough for a measurement? Its estimates must be small and the data of the scene resolved.
     pub(super) fn is_enough(&self) -> bool {
         // The errors of figures are products of two estimated errors, see [`Cause::FIGURE`].
-        let named = !self.scene.accuracy_of.is_empty();
+        let named = !self.scene().accuracy_of.is_empty();
         let wanted = if named { self.accuracy.sqrt() } else { self.accuracy };
         self.error <= GOOD_ENOUGH * wanted
             && (named || self.open <= GOOD_ENOUGH)
@@ -107,10 +108,10 @@ impl<'a> Round<'a> {
         &self,
         measured: Option<&Measurement>,
         rounds: usize,
-        not_reached: Option<String>,
+        end: Option<&End>,
     ) -> Adapted {
         let worst = |measured: &Measurement| {
-            let errors = measured.errors(&self.scene.accuracy_of).into_iter();
+            let errors = measured.errors(&self.scene().accuracy_of).into_iter();
             errors.map(|error| (error.name, error.relative)).next()
         };
         Adapted {
@@ -123,7 +124,7 @@ impl<'a> Round<'a> {
             steps: MAX_SHARE_OF_STEPS * self.accuracy,
             measured: measured.map_or_else(Measured::default, Measurement::result),
             worst: measured.and_then(worst),
-            not_reached,
+            not_reached: end.filter(|end| **end != End::Reached).map(End::to_string),
         }
     }
 
@@ -131,8 +132,10 @@ impl<'a> Round<'a> {
     fn missed(&self, measured: Option<&Measurement>) -> Vec<(f64, Cause)> {
         let Some(measured) = measured else { return Vec::new() };
         let has_points = !self.singular.is_empty() || !self.run.extremes.ends.is_empty();
-        let errors = measured.errors(&self.scene.accuracy_of).into_iter();
-        let errors = errors.map(|error| (error.excess(self.accuracy), measured.cause(&error.name)));
+        let errors = measured.errors(&self.scene().accuracy_of).into_iter();
+        let errors = errors.map(|error| {
+            (error.excess(self.accuracy), measured.cause(&error.name, self.run.problem))
+        });
         let with_points = |(excess, cause)| match cause {
             Cause::Reactions if !has_points => (excess, Cause::FIGURE),
             cause => (excess, cause),
@@ -140,7 +143,7 @@ impl<'a> Round<'a> {
         errors.filter(|(excess, _)| *excess > 1.0).map(with_points).collect()
     }
 
-    /// The mesh of the next round. After a measurement it has at least 1.3 times as many triangles, if smaller goals for
+    /// The next mesh. After a measurement it has at least 1.3 times as many triangles, if smaller goals for
     /// the errors of the figures give them: a mesh that is hardly finer is not worth its measurement.
     pub(super) fn refined(
         &self,
@@ -168,7 +171,7 @@ impl<'a> Round<'a> {
     /// error of a figure, these become smaller; the error is of first order in their size. Any other error requires
     /// smaller errors of u and the damage. The errors of the figures are to become `goal` times the usual aim.
     fn size_ratios(&self, measured: Option<&Measurement>, goal: f64) -> Vec<f64> {
-        let order = if self.scene.order == Order::Quadratic { 2 } else { 1 };
+        let order = if self.scene().order == Order::Quadratic { 2 } else { 1 };
         let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
         if let Some(measured) = measured {
             let larger = |(own, of_parts): (&mut f64, &f64)| *own = own.max(*of_parts);

@@ -1,8 +1,10 @@
-//! A run with few time steps, the error of u and the penetration on each triangle, and the figures of all steps.
+//! SOLVE: a run with few time steps, the error of u and the penetration on each triangle, and the answer that stays.
 
+use super::Extremes;
 use crate::{
-    estimate::{Extremes, RecoveredStrains, UNLOADED, recovery::at_vertices},
+    estimate::{RecoveredStrains, UNLOADED, at_vertices},
     evolution::{Choices, Outcome, Phases, RunError, Step, all_steps},
+    mesh::Mesh,
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State, Value},
 };
@@ -172,6 +174,43 @@ impl<'a> FewStepRun<'a> {
         let share = |(max, end): (&f64, &f64)| (max / energy).max(end / of_last);
         let shares = squares.iter().zip(last).map(share).collect();
         ((worst / energy).max(error / of_last).sqrt(), shares)
+    }
+}
+
+/// The answer of a run on a mesh.
+pub(super) struct Answer {
+    pub(super) mesh: Mesh,
+    /// ζ at the end, at the nodes of the mesh.
+    pub(super) zeta: Vec<f64>,
+    /// The times at which steps end, s.
+    pub(super) times: Vec<f64>,
+    /// η.
+    pub(super) error: f64,
+    /// The figures at the end.
+    pub(super) values: Vec<f64>,
+    /// The length of the part of Γ_C on which the ends of contact may lie, m.
+    pub(super) open: f64,
+    /// The time of ζ_*, s.
+    pub(super) stop: Option<f64>,
+}
+
+impl Answer {
+    /// The answer of `run` on `mesh`. Collective.
+    pub(super) fn new(run: &FewStepRun, mesh: Mesh) -> Self {
+        let (error, _) = run.relative();
+        let (mut zeta, of_triangles) = (vec![1.0; mesh.nodes.len()], run.zeta());
+        for (t, nodes) in mesh.triangles.iter().enumerate() {
+            nodes.iter().zip(&of_triangles).for_each(|(&node, of)| zeta[node] = of[t]);
+        }
+        Self {
+            mesh,
+            zeta,
+            times: run.times().to_vec(),
+            error,
+            values: run.values().iter().map(|of| of.value).collect(),
+            open: run.open_length(),
+            stop: run.stop(),
+        }
     }
 }
 

@@ -7,18 +7,16 @@
 //! large, or if its time steps differ, this mesh is bisected itself.
 
 use super::{
-    AdaptError, Measured,
+    AdaptError, Answer, End, Extreme, FEW, FewStepRun, Limits, Measured,
     changes::{damage, displacement},
-    few_step_run::{FEW, FewStepRun},
-    limits::Limits,
-    sequence::{Level, Sequence},
+    sequence::Sequence,
 };
 use crate::{
-    estimate::Extreme,
     evolution::{AIM, Choices},
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
-    problem::{Bar, Dimension, DiscreteProblem, Figure},
+    problem::{Bar, Dimension, DiscreteProblem, Figure, Of},
+    scene::Probe,
 };
 use std::slice::from_ref;
 
@@ -94,14 +92,10 @@ pub(super) struct Measurement {
     /// Per triangle: its share of the squared error of ζ, and max |Δζ|; empty without damage.
     of_damage: Vec<f64>,
     zeta: Vec<f64>,
-    /// The names of the extremes, with those of the lengths of contact; none if the run ends at ζ_*.
-    extremes: Vec<String>,
     /// The extremes of stresses and pressures on the bisected mesh.
     of_points: Vec<Extreme>,
-    /// The probes with their points, m.
-    probes: Vec<(String, [f64; 2])>,
     /// The mesh bisected everywhere and the answer there.
-    finer: Option<(Refinement, Level)>,
+    finer: Option<(Refinement, Answer)>,
 }
 
 impl Measurement {
@@ -113,10 +107,10 @@ impl Measurement {
     /// A triangle cannot be bisected, or the run on the finer mesh fails.
     pub(super) fn new(
         session: &Session,
-        answer: &Level,
+        answer: &Answer,
         coarse: &FewStepRun,
         choices: &Choices,
-        before: &[Level],
+        before: &[Answer],
         accuracy: Option<f64>,
         limits: &mut Limits,
     ) -> Result<Self, AdaptError> {
@@ -131,9 +125,9 @@ impl Measurement {
         let run = || FewStepRun::run(session, &of_fine, choices, triangles, FEW, coarse.times());
         let failed = |source| AdaptError::Run { triangles, source };
         let fine = limits.measure(triangles, run).map_err(failed)?;
-        let mut levels = vec![Level::new(&fine, finer.mesh.clone())];
-        let two = Sequence::new(before, answer, &levels, true);
-        let mut measured = Self::of_fields(&two, &finer, [answer, &levels[0]], coarse, &fine);
+        let mut answers = vec![Answer::new(&fine, finer.mesh.clone())];
+        let two = Sequence::new(before, answer, &answers, true);
+        let mut measured = Self::of_fields(&two, &finer, [answer, &answers[0]], coarse, &fine);
         measured.set_bars(&two, coarse, &fine);
         let misses = |measured: &Self| {
             accuracy.is_some_and(|accuracy| measured.excess(accuracy, &scene.accuracy_of) > 1.0)
@@ -145,15 +139,15 @@ impl Measurement {
         let triangles = 4 * triangles;
         let is_decided = accuracy.is_some() && triangles > CHEAP && !misses(&measured);
         if is_done || is_decided || limits.exceeded(&[triangles]).is_some() {
-            measured.finer = levels.pop().map(|fine| (finer, fine));
+            measured.finer = answers.pop().map(|fine| (finer, fine));
             return Ok(measured);
         }
         let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
         let problem = problem(&finest)?;
         let run = || FewStepRun::run(session, &problem, choices, triangles, FEW, coarse.times());
         if let Ok(run) = limits.measure(triangles, run) {
-            levels.push(Level::new(&run, finest));
-            measured.set_bars(&Sequence::new(before, answer, &levels, true), coarse, &fine);
+            answers.push(Answer::new(&run, finest));
+            measured.set_bars(&Sequence::new(before, answer, &answers, true), coarse, &fine);
         }
         Ok(measured)
     }
@@ -162,8 +156,8 @@ impl Measurement {
     /// same finer mesh. `None` if the time steps differ from those `before`, or if a run stops. Collective.
     pub(super) fn on_refined(
         &self,
-        before: &[Level],
-        answer: &Level,
+        before: &[Answer],
+        answer: &Answer,
         coarse: &FewStepRun,
     ) -> Option<Self> {
         let (finer, fine) = self.finer.as_ref().filter(|_| self.stop.is_none())?;
@@ -179,7 +173,7 @@ impl Measurement {
             measured.damage = shares.iter().sum::<f64>().sqrt() + sequence.rate() * self.damage;
             measured.zeta = largest;
         }
-        (measured.extremes, measured.unsettled) = (self.extremes.clone(), self.unsettled.clone());
+        measured.unsettled = self.unsettled.clone();
         measured.set_bars_of_settled(&sequence, coarse);
         Some(measured)
     }
@@ -188,14 +182,12 @@ impl Measurement {
     fn of_fields(
         sequence: &Sequence,
         finer: &Refinement,
-        [answer, finer_answer]: [&Level; 2],
+        [answer, finer_answer]: [&Answer; 2],
         coarse: &FewStepRun,
         fine: &FewStepRun,
     ) -> Self {
         let problem = coarse.problem;
         let mut measured = Self::default();
-        let probes = problem.scene().probes.iter();
-        measured.probes = probes.map(|probe| (probe.name.clone(), probe.point)).collect();
         (measured.displacement, _) = coarse.relative();
         let (_, of_parts) = fine.relative();
         // The squared error of order p on the whole triangle is 4^p times the sum on its parts.
@@ -221,8 +213,6 @@ impl Measurement {
             measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
             measured.zeta = largest;
         }
-        let extremes = problem.figures.iter().filter(|of| of.is_extreme());
-        measured.extremes = extremes.map(|of| of.name.clone()).collect();
         measured.of_points = fine.extremes.named(&problem.singular_points());
         measured
     }
@@ -258,11 +248,6 @@ impl Measurement {
         problem.join_bars(&mut self.bars, coarse.values());
     }
 
-    /// The names of the extremes.
-    pub(super) fn extremes(&self) -> &[String] {
-        &self.extremes
-    }
-
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.
     pub(super) fn leave_out(&mut self, names: &[String]) {
         self.bars.retain(|bar| !names.contains(&bar.name));
@@ -270,11 +255,9 @@ impl Measurement {
     }
 
     /// Why a figure in `names` has no accuracy, if the meshes do not settle one.
-    pub(super) fn without_accuracy(&self, names: &[String]) -> Option<String> {
+    pub(super) fn without_accuracy(&self, names: &[String]) -> Option<End> {
         let name = names.iter().find(|name| self.unsettled.contains(name))?;
-        Some(format!(
-            "{name} changes with every finer mesh, as a singular stress does; ask for other figures"
-        ))
+        Some(End::Unsettled(name.clone()))
     }
 
     /// The errors of a run on the mesh.
@@ -308,27 +291,24 @@ impl Measurement {
         errors
     }
 
-    /// The cause of the error of the figure `name`.
-    pub(super) fn cause(&self, name: &str) -> Cause {
+    /// The cause of the error of the figure or norm `name` of `problem`.
+    pub(super) fn cause(&self, name: &str, problem: &DiscreteProblem) -> Cause {
         let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
             let of_damage = || Cause::Damage(self.of_damage.clone());
             return if name == "damage" { of_damage() } else { Cause::Fields(1.0) };
         };
-        let at_probe = |(probe, _): &&(String, _)| {
-            name.strip_prefix(probe).is_some_and(|rest| rest.starts_with('.'))
-        };
-        // A material may have the name of a probe.
         let of_extreme = self.of_points.iter().find(|of| of.name == name).map(|of| of.at);
-        let at = of_extreme.or_else(|| self.probes.iter().find(at_probe).map(|probe| probe.1));
-        match (bar.dimension, at) {
+        let figure = problem.figures.number(name).map(|number| &problem.figures[number]);
+        let is_at =
+            |probe: &&Probe| figure.is_some_and(|of| of.of == Of::Probe(probe.name.clone()));
+        let of_probe = || problem.scene().probes.iter().find(is_at).map(|probe| probe.point);
+        match (bar.dimension, of_extreme.or_else(of_probe)) {
             (Dimension::ContactLength, _) => Cause::Ends,
             (Dimension::Zeta, _) => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
             (Dimension::Length, Some(at)) => Cause::Around(at, 0),
             (Dimension::Stress, Some(at)) => Cause::Around(at, 1),
-            (Dimension::Length | Dimension::Stress, None) => Cause::FIGURE,
-            (Dimension::Work | Dimension::OfZeta, _) => Cause::FIGURE,
-            (Dimension::Place | Dimension::Given, _) => Cause::FIGURE,
+            _ => Cause::FIGURE,
         }
     }
 }

@@ -11,8 +11,8 @@
 //! The last term is the sum of all further changes if they fall like η. The error of a figure is a product of two errors in
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
-use super::{few_step_run::FewStepRun, sizes::size_at};
-use crate::{estimate::Extreme, mesh::Mesh, problem::SEEN};
+use super::{Answer, Extreme, sizes::size_at};
+use crate::problem::SEEN;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The safety factor of a bar, and the larger one of the bar of a stress: on 40 bodies of a user 10 % of the bars of
@@ -25,46 +25,9 @@ const SAFETY: [f64; 2] = [1.5, 2.0];
 /// Tuned on 720 bars of the handbook. 0.7: the same bars hold. 0.925: the same bars hold.
 const SLOWEST: f64 = 0.85;
 
-/// The answer of a run on a mesh.
-pub(super) struct Level {
-    pub(super) mesh: Mesh,
-    /// ζ at the end, at the nodes of the mesh.
-    pub(super) zeta: Vec<f64>,
-    /// The times at which steps end, s.
-    pub(super) times: Vec<f64>,
-    /// η.
-    pub(super) error: f64,
-    /// The figures at the end.
-    values: Vec<f64>,
-    /// The length of the part of Γ_C on which the ends of contact may lie, m.
-    open: f64,
-    /// The time of ζ_*, s.
-    stop: Option<f64>,
-}
-
-impl Level {
-    /// The answer of `run` on `mesh`. Collective.
-    pub(super) fn new(run: &FewStepRun, mesh: Mesh) -> Self {
-        let (error, _) = run.relative();
-        let (mut zeta, of_triangles) = (vec![1.0; mesh.nodes.len()], run.zeta());
-        for (t, nodes) in mesh.triangles.iter().enumerate() {
-            nodes.iter().zip(&of_triangles).for_each(|(&node, of)| zeta[node] = of[t]);
-        }
-        Self {
-            mesh,
-            zeta,
-            times: run.times().to_vec(),
-            error,
-            values: run.values().iter().map(|of| of.value).collect(),
-            open: run.open_length(),
-            stop: run.stop(),
-        }
-    }
-}
-
 /// The answers on meshes from the coarsest to the finest one.
 pub(super) struct Sequence<'a> {
-    levels: Vec<&'a Level>,
+    answers: Vec<&'a Answer>,
     /// The number of the mesh of the answer, and of the mesh that was bisected to the finest one.
     answer: usize,
     bisected: usize,
@@ -77,31 +40,31 @@ impl<'a> Sequence<'a> {
     /// on which a run stops, and this one not, do not count. The mesh of the answer, or else the last one `before` it, was
     /// bisected to the first finer one.
     pub(super) fn new(
-        before: &'a [Level],
-        answer: &'a Level,
-        finer: &'a [Level],
+        before: &'a [Answer],
+        answer: &'a Answer,
+        finer: &'a [Answer],
         is_bisected: bool,
     ) -> Self {
-        let is_like = |level: &&Level| level.stop.is_some() == answer.stop.is_some();
-        let mut levels: Vec<&Level> = before.iter().filter(is_like).collect();
-        let number = levels.len();
-        levels.push(answer);
-        levels.extend(finer);
-        let bisected = levels.len() - if is_bisected { 2 } else { 3 };
-        let [coarse, fine] = [bisected, levels.len() - 1].map(|number| levels[number].error);
+        let is_like = |other: &&Answer| other.stop.is_some() == answer.stop.is_some();
+        let mut answers: Vec<&Answer> = before.iter().filter(is_like).collect();
+        let number = answers.len();
+        answers.push(answer);
+        answers.extend(finer);
+        let bisected = answers.len() - if is_bisected { 2 } else { 3 };
+        let [coarse, fine] = [bisected, answers.len() - 1].map(|number| answers[number].error);
         let rate = if fine < SLOWEST * coarse { fine / coarse } else { SLOWEST };
-        Self { levels, answer: number, bisected, rate }
+        Self { answers, answer: number, bisected, rate }
     }
 
     /// The same meshes, if the changes fall like h^½ at most, as at a crack: two meshes alone do not show how they fall.
     pub(super) fn slower(&self) -> Self {
-        Self { levels: self.levels.clone(), rate: self.rate.max(FRAC_1_SQRT_2), ..*self }
+        Self { answers: self.answers.clone(), rate: self.rate.max(FRAC_1_SQRT_2), ..*self }
     }
 
     /// Is a mesh before so much coarser that it is the third one? With 1 in place of 2, four more of those 720 bars fail.
     pub(super) fn has_coarser(&self) -> bool {
-        let [before @ .., answer] = &self.levels[..=self.answer] else { return false };
-        before.iter().any(|level| level.error >= 2.0 * answer.error)
+        let [before @ .., answer] = &self.answers[..=self.answer] else { return false };
+        before.iter().any(|other| other.error >= 2.0 * answer.error)
     }
 
     /// r.
@@ -109,21 +72,21 @@ impl<'a> Sequence<'a> {
         self.rate
     }
 
-    /// The bar with the factor `safety`, from the `difference` of a figure between a level and the finest one.
-    fn bar(&self, safety: f64, difference: impl Fn(&Level, &Level) -> f64) -> f64 {
-        let [coarser @ .., finest] = &self.levels[..] else { return 0.0 };
+    /// The bar with the factor `safety`, from the `difference` of a figure between an answer and the finest one.
+    fn bar(&self, safety: f64, difference: impl Fn(&Answer, &Answer) -> f64) -> f64 {
+        let [coarser @ .., finest] = &self.answers[..] else { return 0.0 };
         let (before, from_answer) = coarser.split_at(self.answer);
-        let weighted = before.iter().map(|level| {
-            let ratio = if level.error > from_answer[0].error {
-                from_answer[0].error / level.error
+        let weighted = before.iter().map(|answer| {
+            let ratio = if answer.error > from_answer[0].error {
+                from_answer[0].error / answer.error
             } else {
                 1.0
             };
-            ratio * ratio * difference(level, finest)
+            ratio * ratio * difference(answer, finest)
         });
-        let changes = from_answer.iter().map(|level| difference(level, finest));
+        let changes = from_answer.iter().map(|answer| difference(answer, finest));
         let largest = changes.chain(weighted.reduce(f64::min)).fold(0.0, f64::max);
-        let last = difference(self.levels[self.bisected], finest);
+        let last = difference(self.answers[self.bisected], finest);
         safety * (largest + last * self.rate / (1.0 - self.rate))
     }
 
@@ -134,15 +97,15 @@ impl<'a> Sequence<'a> {
 
     /// The bar of the figure `i`, a length of contact. A change within the open parts is no error beyond them.
     pub(super) fn error_of_length(&self, i: usize) -> f64 {
-        let change = |a: &Level, b: &Level| (a.values[i] - b.values[i]).abs() - a.open - b.open;
-        SAFETY[0] * self.levels[self.answer].open
+        let change = |a: &Answer, b: &Answer| (a.values[i] - b.values[i]).abs() - a.open - b.open;
+        SAFETY[0] * self.answers[self.answer].open
             + self.bar(SAFETY[0], |a, b| change(a, b).max(0.0))
     }
 
     /// The bar of the time of ζ_*, and this time, s. It is infinite if the answer or a finer mesh does not stop; `None` if none
     /// of them stops.
     pub(super) fn stop(&self) -> Option<[f64; 2]> {
-        let times = self.levels[self.answer..].iter().map(|level| level.stop);
+        let times = self.answers[self.answer..].iter().map(|answer| answer.stop);
         let time = times.clone().flatten().last()?;
         if times.clone().any(|time| time.is_none()) {
             return Some([f64::INFINITY, time]);
@@ -161,14 +124,14 @@ impl<'a> Sequence<'a> {
         if extreme.unresolved.is_some() {
             return false;
         }
-        let sizes = self.levels.iter().map(|level| size_at(&level.mesh, extreme.at));
-        let (sizes, finest) = (Vec::from_iter(sizes), self.levels.len() - 1);
+        let sizes = self.answers.iter().map(|answer| size_at(&answer.mesh, extreme.at));
+        let (sizes, finest) = (Vec::from_iter(sizes), self.answers.len() - 1);
         let change = |from: usize, to: usize| {
-            let change = self.levels[to].values[i] - self.levels[from].values[i];
+            let change = self.answers[to].values[i] - self.answers[from].values[i];
             change.abs() / (sizes[from] / sizes[to]).log2()
         };
         let last = change(finest - 1, finest);
-        if last <= SEEN * self.levels[finest].values[i].abs() {
+        if last <= SEEN * self.answers[finest].values[i].abs() {
             return true;
         }
         let first = if extreme.singular.is_some() { self.answer } else { 0 };

@@ -1,0 +1,137 @@
+//! What is concluded at the end of a run: is the accuracy reached, and what do the error bars not contain?
+
+use super::{Adapted, Extreme, LoopState, first_mesh::kinks};
+use crate::{
+    evolution::{Outcome, Step, percent},
+    mesh::Order,
+    problem::{Bar, DiscreteProblem},
+};
+
+/// Why a pressure is not resolved below a gap with a table of the place.
+pub(super) const KINKS_OF_TABLE: &str = "the gap's table has kinks; spline(\"…\") is smooth";
+
+impl LoopState {
+    /// Is the required accuracy reached? With the closing line: the mesh, and the errors that are too large. `None` without
+    /// a required accuracy. A run that failed has no outcome.
+    pub fn conclusion(
+        &self,
+        problem: &DiscreteProblem,
+        outcome: Option<&Outcome>,
+    ) -> Option<(bool, String)> {
+        let (adapted, scene) = (self.adapted.as_ref()?, problem.scene());
+        let accuracy = scene.accuracy?;
+        let (triangles, rounds) = (adapted.mesh.triangles.len(), adapted.rounds);
+        let degree = if scene.order == Order::Quadratic { 2 } else { 1 };
+        let mesh = format!(
+            "P{degree} on {triangles} triangles, mesh {rounds} of those tried (kept as mesh.msh)"
+        );
+        let asked = match &scene.accuracy_of[..] {
+            [] => format!("accuracy {accuracy}"),
+            names => format!("accuracy {accuracy} of {}", names.join(", ")),
+        };
+        let Some(outcome) = outcome else { return Some((false, format!("{asked}: {mesh}"))) };
+        let reasons = self.reasons(adapted, accuracy, problem, outcome);
+        let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
+        let probes: Vec<_> =
+            scene.probes.iter().map(|probe| format!("{}.von_mises", probe.name)).collect();
+        let at_probe = |bar: &&Bar| probes.contains(&bar.name);
+        let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {
+            format!(" (stresses at probes: of {:.1e} {})", bar.scale, scene.units.stress)
+        });
+        let note = match reasons.is_empty() {
+            true => format!("{asked} reached{of_time}{stresses}: {mesh}"),
+            false => format!("{asked} NOT reached ({}): {mesh}", reasons.join("; ")),
+        };
+        Some((reasons.is_empty(), note))
+    }
+
+    /// The reasons why the accuracy is not reached; none if it is.
+    fn reasons(
+        &self,
+        adapted: &Adapted,
+        accuracy: f64,
+        problem: &DiscreteProblem,
+        outcome: &Outcome,
+    ) -> Vec<String> {
+        let scene = problem.scene();
+        let bars = outcome.bars.iter().filter(|bar| scene.requires_accuracy_of(&bar.name));
+        let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
+        let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
+        let of_stop = outcome.stopped.map(|stop| ("stopped_at".to_owned(), stop.bar() / stop.time));
+        let worst = bars.chain(norms.cloned()).chain(of_stop).max_by(|a, b| a.1.total_cmp(&b.1));
+        let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
+            let error = match percent(error) {
+                _ if !error.is_finite() => "?".to_owned(),
+                same if same == percent(accuracy) => format!("{:.3} %", 100.0 * error),
+                percent => percent,
+            };
+            format!("{name} is exact to {error} only")
+        });
+        let unconfirmed = self.is_unconfirmed_stop(outcome);
+        let unconfirmed = unconfirmed
+            .then_some("only this run stops at ζ_*, not the runs that measure its errors");
+        // Only the limit on the time prevents a repetition.
+        let is_last = self.repeats || outcome.shorter_steps(problem, &self.measured).is_none();
+        let limit = (!is_last)
+            .then_some("a repetition with shorter steps would take longer than --max-seconds");
+        let of_run = [unconfirmed, limit].into_iter().flatten().map(str::to_owned);
+        let of_mesh = missed.into_iter().chain(adapted.not_reached.clone());
+        of_mesh.chain(of_run).chain(self.missing_bars(outcome)).collect()
+    }
+
+    /// Notes on the accuracy and on the error bars of the run of `problem`.
+    pub fn notes(&self, problem: &DiscreteProblem, outcome: Option<&Outcome>) -> Vec<String> {
+        let is_fixed = self.adapted.is_none();
+        let notes = [
+            self.conclusion(problem, outcome).map(|(_, note)| note),
+            self.kinks(problem),
+            outcome.filter(|_| is_fixed).and_then(|outcome| self.missing_bars(outcome)),
+        ];
+        notes.into_iter().flatten().chain(self.notes.iter().cloned()).collect()
+    }
+
+    /// A note on error bars that are missing although the errors from the mesh were measured.
+    fn missing_bars(&self, outcome: &Outcome) -> Option<String> {
+        let is_missing = outcome.stopped.is_none() && outcome.bars.is_empty();
+        (is_missing && self.measured.stop.is_some()).then(|| {
+            "no error bars: with few time steps, or on a finer mesh, the run stops at ζ_*"
+                .to_owned()
+        })
+    }
+
+    /// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve
+    /// that they only follow roughly.
+    fn kinks(&self, problem: &DiscreteProblem) -> Option<String> {
+        let (mesh, scene) = (&self.adapted.as_ref()?.mesh, problem.scene());
+        let kinks = kinks(scene, mesh, scene.accuracy?).into_iter();
+        let kinks = kinks.filter(|(allowed, kink)| !kink.is_corner && kink.angle > 2.0 * allowed);
+        let (_, kink) = kinks.max_by(|(a, p), (b, q)| (p.angle / a).total_cmp(&(q.angle / b)))?;
+        let at = mesh.place(mesh.nodes[kink.node]);
+        Some(format!(
+            "curved edges meet at {at} at an angle of {:.1e}°: if the curve is smooth there, the bars do not \
+             contain the error of its shape; set smaller sizes there in the .geo",
+            kink.angle.to_degrees()
+        ))
+    }
+}
+
+/// Notes on the `extremes` of the `last` state: a pressure that shows the kinks of a table, and a sound body with a singular
+/// stress. On finer meshes this stress grows and may exceed the threshold of the damage, which no error bar shows.
+pub fn notes_on_extremes(
+    problem: &DiscreteProblem,
+    last: &Step,
+    extremes: &[Extreme],
+) -> Vec<String> {
+    let is_sound = problem.damage().is_some() && last.record.zeta_min == 1.0;
+    let point = extremes.iter().find_map(|of| of.singular.as_ref()).filter(|_| is_sound);
+    let hidden = point.map(|point| {
+        format!(
+            "no damage on this mesh, but the stress is singular at {point}: on finer ones it may exceed the threshold of \
+             the damage there, which the error bars do not contain"
+        )
+    });
+    let mut reasons = extremes.iter().filter_map(|of| of.unresolved.as_ref());
+    let reason = reasons.find(|reason| reason.ends_with(KINKS_OF_TABLE));
+    let kinks = reason.map(|reason| format!("the contact pressure is not resolved ({reason})"));
+    hidden.into_iter().chain(kinks).collect()
+}

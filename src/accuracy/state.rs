@@ -1,0 +1,133 @@
+//! The state of the accuracy loop of a run: the mesh, the measured errors, and whether the run is repeated.
+
+use super::{AdaptError, Adapted, Measured, adapted, measured_errors};
+use crate::{
+    evolution::{Choices, Outcome},
+    mesh::Mesh,
+    petsc::Session,
+    problem::{DiscreteProblem, locks},
+    scene::{Scene, Stepping},
+};
+use serde::{Deserialize, Serialize};
+
+/// All that is known of the errors from the mesh before the run that is written. A restart needs nothing else of the loop.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct LoopState {
+    /// The adapted mesh, if an accuracy is required.
+    pub adapted: Option<Adapted>,
+    /// The measured errors of the mesh; empty if they were not measured.
+    pub measured: Measured,
+    /// Is the run a repetition with shorter steps?
+    pub repeats: bool,
+    /// Notes on error bars that are missing.
+    pub notes: Vec<String>,
+}
+
+impl LoopState {
+    /// The loop up to the run that is written, with the mesh of this run. If the scene requires an accuracy, the loop adapts the
+    /// `mesh` and the time steps of the scene; a restart takes those that it has `saved`. Otherwise the loop has a fixed mesh and
+    /// measures the error `bars` on request. `seen` is called with each adapted mesh. Collective.
+    ///
+    /// # Errors
+    /// No mesh can be adapted, or a signal has ended a run.
+    pub fn start(
+        session: &Session,
+        scene: &mut Scene,
+        mesh: Mesh,
+        (bars, saved): (bool, Option<Self>),
+        seen: &mut dyn FnMut(&Adapted),
+    ) -> Result<(Self, Mesh), AdaptError> {
+        let saved = saved.filter(|state| state.adapted.is_some());
+        let (mut state, choices) = (saved.unwrap_or_default(), Choices::of(scene));
+        if let (None, Some(accuracy)) = (&state.adapted, scene.accuracy) {
+            let found = adapted(session, scene, mesh.clone(), &choices, accuracy, seen)?;
+            (state.measured, state.adapted) = (found.measured.clone(), Some(found));
+        }
+        let Some(Adapted { mesh, steps, damage, .. }) = &state.adapted else {
+            if bars {
+                state.measured = state.measure(session, scene, &mesh, None)?;
+            }
+            return Ok((state, mesh));
+        };
+        if let Some(grid) = &mut scene.time {
+            grid.stepping = Stepping::Auto { tolerance: *steps, expected: *damage };
+        }
+        let mesh = mesh.clone();
+        Ok((state, mesh))
+    }
+
+    /// Measures the errors from the mesh, in runs with few steps or with the error `of_steps` of ζ. If such a run fails, or a finer
+    /// mesh would not show the error, a note reports it. Collective.
+    fn measure(
+        &mut self,
+        session: &Session,
+        scene: &Scene,
+        mesh: &Mesh,
+        of_steps: Option<f64>,
+    ) -> Result<Measured, AdaptError> {
+        // A mesh that was adapted is so fine that it does not lock.
+        if of_steps.is_none() && locks(scene).is_some() {
+            let note = "no error bars: a finer mesh does not show that linear triangles lock";
+            self.notes.push(note.to_owned());
+            return Ok(Measured::default());
+        }
+        match measured_errors(session, scene, mesh, &Choices::of(scene), of_steps) {
+            // The scene fits this mesh, perhaps not the finer one.
+            Err(error) if error.signal().is_none() => {
+                self.notes.push(format!("the error bars could not be measured: {error}"));
+                Ok(Measured::default())
+            }
+            measured => measured,
+        }
+    }
+
+    /// The factor for the tolerance of the time steps of a repetition of the run of `problem` with this `outcome`. `None` if there
+    /// is none: its time steps are short enough, it is a repetition itself, or there is no time, with the seconds `passed` since
+    /// the start and those of the run.
+    pub fn shorter_steps(
+        &self,
+        problem: &DiscreteProblem,
+        outcome: &Outcome,
+        [passed, seconds]: [f64; 2],
+    ) -> Option<f64> {
+        // Lengths of steps are on a ladder of √2, and their errors are of second order: an error may be twice the one
+        // asked for.
+        let ratio =
+            0.5 * outcome.shorter_steps(problem, &self.measured).filter(|_| !self.repeats)?;
+        let most = problem.scene().max_seconds.unwrap_or(f64::INFINITY);
+        (passed + seconds / ratio.sqrt() <= most).then_some(ratio)
+    }
+
+    /// Sets the time steps of a repetition, shorter by `ratio`. If the run stopped at ζ_*, but not the runs with few steps that
+    /// measured its errors, then the time of ζ_* is measured with steps whose error is half of ζ_*. Collective.
+    ///
+    /// # Errors
+    /// A signal has ended a run.
+    pub fn repeat(
+        &mut self,
+        session: &Session,
+        problem: &mut DiscreteProblem,
+        outcome: &Outcome,
+        ratio: f64,
+    ) -> Result<(), AdaptError> {
+        self.repeats = true;
+        if self.is_unconfirmed_stop(outcome) {
+            let scene = problem.scene();
+            let of_steps = scene.damage.as_ref().map(|damage| 0.5 * damage.law.threshold);
+            let confirmed = self.measure(session, scene, problem.mesh(), of_steps)?;
+            if confirmed.stop.is_some() {
+                self.measured = confirmed;
+            }
+        }
+        if let Some(adapted) = &mut self.adapted {
+            adapted.steps *= ratio;
+            problem.set_step_tolerance(adapted.steps);
+        }
+        Ok(())
+    }
+
+    /// Did the run stop at ζ_*, but not the runs that measured the errors of the mesh? The time steps may cause the stop.
+    pub(super) fn is_unconfirmed_stop(&self, outcome: &Outcome) -> bool {
+        self.adapted.is_some() && outcome.stopped.is_some() && self.measured.stop.is_none()
+    }
+}
