@@ -8,6 +8,7 @@ from limits import limits_of
 from maps import draw_state
 from reading import evenly, states
 from results import ResultError
+from signorini_files import whole
 
 
 class GifWriter(PillowWriter):
@@ -37,7 +38,7 @@ def animate(results, factor, kind):
         if figure is None:
             continue
         path, movie = results.folder / f"{name}.{kind}", writer(fps=RATE)
-        with movie.saving(figure, path, dpi=110):
+        with whole(path) as part, movie.saving(figure, part, dpi=110):
             for state in chosen:
                 draw(state, limits, figure)
                 movie.grab_frame()

@@ -19,6 +19,7 @@ import numpy as np
 
 from reading import read_frame
 from results import markdown, write_table
+from signorini_files import begins, check, whole
 from signorini_results import load
 
 # Titles of the printed table; the others are shown in comparison.csv alone.
@@ -61,6 +62,7 @@ def compared(scene, arguments):
     for solver in arguments.solvers:
         folder = arguments.out / f"{scene.stem}-{solver.replace(':', '-')}"
         # A run that fails at its start does not remove the results of an earlier one.
+        check(folder / "history.csv")
         (folder / "history.csv").unlink(missing_ok=True)
         sets = settings(["contact.rescue=false", *arguments.set])
         words = ["run", str(scene), "--solver", solver, "--out", str(folder)]
@@ -145,6 +147,11 @@ def table(rows):
     return markdown(header, lines, left=(0, 1, len(TITLES)))
 
 
+def is_own(path):
+    """Whether a file is a table of this script."""
+    return begins(path, b"scene,solver,steps,contact_changes,")
+
+
 def arguments_of(prog):
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -171,6 +178,8 @@ def main(prog=None):
     if not arguments.solvers:
         names = subprocess.run([os.environ["SIGNORINI"], "solvers"], capture_output=True, text=True)
         arguments.solvers = [line.split("\t")[0] for line in names.stdout.splitlines()]
+    path = arguments.out / "comparison.csv"
+    check(path, is_own)
     try:
         for scene in arguments.scenes:
             for solver in arguments.solvers:
@@ -183,8 +192,8 @@ def main(prog=None):
           "times first: over the seconds of the scene's first solver")
     # Runs that fail at their start make no folder.
     arguments.out.mkdir(parents=True, exist_ok=True)
-    path = arguments.out / "comparison.csv"
-    write_table(rows, path)
+    with whole(path, is_own) as part:
+        write_table(rows, part)
     print(f"written to {path}")
     errors = [f"{row['scene']}, {row['solver']}: {row['error']}" for row in rows if row["error"]]
     print(*(f"error: {error}\n" for error in errors), sep="", end="", file=sys.stderr)

@@ -49,6 +49,8 @@ plt.rcParams.update({
     "axes.spines.right": False,
     "legend.frameon": False,
     "axes.formatter.limits": (-3, 5),
+    # Names and units may have dollar signs.
+    "text.parse_math": False,
     # TrueType fonts, which journals accept.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,

@@ -39,6 +39,7 @@ from principal import draw_principal
 from reading import evenly, read_results, states
 from results import telling
 from setting import draw_setting
+from signorini_files import check, whole
 from signorini_summaries import folders_of
 
 FIGURES = {
@@ -140,12 +141,14 @@ def save(figure, results, name, formats):
     """Saves a figure and closes it. Without a figure, removes the picture of an earlier run."""
     moment = "" if results.is_last else f"_t{results.time:g}"
     if figure is None:
-        for ending in FORMATS:
-            (results.folder / f"{name}{moment}.{ending}").unlink(missing_ok=True)
+        for path in (results.folder / f"{name}{moment}.{ending}" for ending in FORMATS):
+            check(path)
+            path.unlink(missing_ok=True)
         return
     for ending in formats:
         path = results.folder / f"{name}{moment}.{ending}"
-        figure.savefig(path)
+        with whole(path) as part:
+            figure.savefig(part)
         tell(path)
     drawing.plt.close(figure)
 
@@ -178,13 +181,13 @@ def main(prog=None):
                 abscissa=arguments.abscissa, range=arguments.range)
     arguments.folders = folders_of(arguments.folders)
     if arguments.line or arguments.along:
-        with telling() as problems:
+        with telling(arguments.folders[0]) as problems:
             for path in draw_curves(arguments):
                 tell(path)
         return 2 if problems else 0
     runs, failed = [], False
     for folder in arguments.folders:
-        with telling() as problems:
+        with telling(folder) as problems:
             runs.append(read_results(folder, arguments.time, arguments.material))
             last = runs[-1].frames[-1][0]
             if arguments.time is not None and arguments.time > last:
@@ -197,7 +200,7 @@ def main(prog=None):
             save(draw_forces(runs, names), runs[0], "force-displacement-together", arguments.format)
         return 2 if failed or problems else 0
     for results in runs:
-        with telling() as problems:
+        with telling(results.folder) as problems:
             # Only numbers in the same units can have a common scale.
             shared = limits_of([run for run in runs if run.units == results.units], arguments.factor)
             draw(results, replace(shared, box=box_of([results], shared.factor)), arguments)

@@ -59,7 +59,7 @@ def draw_forces(runs, names, figure=None):
     over = OPTIONS.abscissa or (
         "displacement_max" if all(_grows(results.history["displacement_max"]) for results in runs) else "time")
     # Runs have colours, and supports dashes; the supports of a single run have both.
-    curves = [(", ".join(filter(None, (name, support))).replace("$", r"\$"), results.history[over], force, k)
+    curves = [(", ".join(filter(None, (name, support))), results.history[over], force, k)
               for k, (results, name, of) in enumerate(zip(runs, names, forces))
               for support, force in of.items() if np.nanmax(force) > ROUNDING * largest]
     labels = [label for label, *_ in curves]

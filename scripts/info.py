@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from bars import barred
-from signorini_summaries import bars, flag_of
+from signorini_summaries import bars, flag_of, read_summary
 
 
 def row(name, value):
@@ -42,9 +42,7 @@ def entry(name, value, errors):
 
 
 def description(folder):
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    if not isinstance(summary, dict) or "steps" not in summary:
-        raise ValueError("it tells of no run")
+    summary = read_summary(folder / "summary.json")
     errors = bars(summary)
     lines = [line for name in summary if name != "phases" for line in entry(name, summary[name], errors)]
     frames = []
@@ -69,8 +67,8 @@ def main(prog=None):
     try:
         text = description(folder)
     except (OSError, ValueError) as error:
-        problem = error.strerror if isinstance(error, OSError) else error
-        print(f"error: {folder / 'summary.json'}: {problem}; name a folder of results, out/SCENE", file=sys.stderr)
+        lacks = f"{error.filename}: {error.strerror}; name a folder of results, out/SCENE" if isinstance(error, OSError) else ""
+        print(f"error: {lacks or error}", file=sys.stderr)
         return 2
     print(text)
     return 0

@@ -10,6 +10,7 @@ import signorini_results
 from drawing import INK, em, legend, plot, room_for_legend, wrapped
 from reading import open_run
 from results import ResultError, write_table
+from signorini_files import whole
 from signorini_summaries import units_of
 
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length", **dict.fromkeys(signorini_results.STRAINS, "")}
@@ -34,12 +35,14 @@ def draw_curves(arguments):
                 rows += [{"run": run.folder.name, "time": frame.time, "s": s, quantity: value}
                          for s, value in zip(places, values) if np.isfinite(s)]
         path = folder / f"curves_{where}_{quantity}.csv"
-        write_table(rows, path)
+        with whole(path) as part:
+            write_table(rows, part)
         yield path
         figure = _draw(curves, f"distance along {_way(runs[0], arguments)} ({units['length']})", quantity, units)
         for ending in arguments.format:
             path = folder / f"curves_{where}_{quantity}.{ending}"
-            figure.savefig(path)
+            with whole(path) as part:
+                figure.savefig(part)
             yield path
         plt.close(figure)
 
@@ -49,7 +52,7 @@ def _draw(curves, abscissa, quantity, units):
     below = room_for_legend([label for label, *_ in curves])
     figure, axes = plot(below=below)
     for label, places, values in curves:
-        axes.plot(places, values, label=label.replace("$", r"\$"), linewidth=1.3)
+        axes.plot(places, values, label=label, linewidth=1.3)
     unit = units.get(UNITS.get(quantity, "stress"), "")
     words = quantity.replace("_", " ").replace("mises", "Mises stress")
     axes.set_ylabel(f"{words} ({unit})" if unit else words)

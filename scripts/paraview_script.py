@@ -3,6 +3,8 @@
 import pprint
 from importlib.util import find_spec
 
+from signorini_files import whole
+
 
 def write_script(results, limits):
     """Writes open_in_paraview.py into the result folder; returns its path."""
@@ -22,5 +24,6 @@ def write_script(results, limits):
     text = find_spec("paraview_view").loader.get_source("paraview_view")
     text = text.replace("RUN = {}", f"RUN = {pprint.pformat(run, sort_dicts=False)}", 1)
     path = results.folder / "open_in_paraview.py"
-    path.write_text(text, encoding="utf-8")
+    with whole(path) as part:
+        part.write_text(text, encoding="utf-8")
     return path

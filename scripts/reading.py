@@ -33,8 +33,7 @@ def open_run(folder):
     """A run of `signorini_results` with at least one frame; a problem is an error in one line."""
     folder, summary = Path(folder), {}
     try:
-        with whole(folder / "summary.json"):
-            run = signorini_results.load(folder)
+        run = signorini_results.load(folder)
         summary = run.summary
         # Properties read their files at first use.
         for name, read in (("history.csv", "columns"), ("fields.pvd", "frames")):
@@ -42,6 +41,8 @@ def open_run(folder):
                 if not getattr(run, read):
                     raise ResultError(f"{path}: it is empty")
         return run
+    except ValueError as error:
+        raise ResultError(str(error)) from None
     except OSError as error:
         if failed := summary.get("error"):
             raise ResultError(f"{folder}: nothing to draw, the run failed: {failed}") from None

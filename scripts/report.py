@@ -13,7 +13,9 @@ import json
 import multiprocessing
 import os
 import re
+import signal
 import sys
+import threading
 from concurrent.futures import BrokenExecutor, ProcessPoolExecutor
 from functools import partial
 from importlib.util import find_spec
@@ -31,6 +33,7 @@ from maps import draw_everything, draw_state
 from reading import evenly, read_results, states
 from report_pdf import FULL, LINE, SIZE, SPACE, pages_of
 from results import telling
+from signorini_files import check, whole
 from signorini_summaries import flag_of, folders_of
 from table import text_of
 
@@ -67,18 +70,33 @@ def call(task):
     return TASKS[task]()
 
 
+def obey():
+    """Lets this process end with the one that has started it, also if that is killed, and leaves signals to it."""
+    def watch():
+        multiprocessing.parent_process().join()
+        os._exit(1)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def all_drawn(tasks):
     """The results of functions by name, which are called in as many processes as there are cores. The processes are
     forked, because they cannot import embedded scripts again. A process that ends early lacks memory."""
     TASKS.update(tasks)
+    pool = None
     try:
-        with ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
-            return dict(zip(tasks, pool.map(call, tasks)))
+        pool = ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork"), initializer=obey)
+        return dict(zip(tasks, pool.map(call, tasks)))
     except BrokenExecutor:
         raise MemoryError from None
     except OSError:
         # Processes need shared memory (/dev/shm), which a container may lack. The same error in a picture comes again.
         return {name: task() for name, task in tasks.items()}
+    finally:
+        if pool:
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def pictures(results, everything):
@@ -100,7 +118,7 @@ def table(rows, head=()):
         kind = ' class="number"' if isinstance(value, (int, float)) and not isinstance(value, bool) else ""
         return f"<td{kind}>{html.escape(text_of(value))}</td>"
 
-    lines = [map("<th>{}</th>".format, head)] * bool(head) + [map(cell, row) for row in rows]
+    lines = [[f"<th>{html.escape(name)}</th>" for name in head]] * bool(head) + [map(cell, row) for row in rows]
     lines = "".join(f"<tr>{''.join(line)}</tr>" for line in lines)
     return f"<table>{lines}</table>"
 
@@ -115,7 +133,8 @@ def slider(frames):
     """Pictures of the body and of Γ_C at several times, with a slider."""
     if len(frames) < 2:
         return ""
-    return template()[1].substitute(last=len(frames) - 1, frames=json.dumps(frames))
+    # Nothing in a script may look like the end of it.
+    return template()[1].substitute(last=len(frames) - 1, frames=json.dumps(frames).replace("<", r"\u003c"))
 
 
 def template():
@@ -339,11 +358,15 @@ def main(prog=None):
     arguments, failed = parser.parse_args(), False
     drawing.use(head=False)
     for folder in folders_of(arguments.folders):
-        with telling() as problems:
+        with telling(folder) as problems:
             results = read_results(folder)
             everything = states(results, evenly(results.frames, EVOLUTION))
             path = results.folder / "report.html"
-            path.write_text(page(results, arguments, everything), encoding="utf-8")
+            for ending in (".html", ".pdf")[:1 + arguments.pdf]:
+                check(path.with_suffix(ending))
+            text = page(results, arguments, everything)
+            with whole(path) as part:
+                part.write_text(text, encoding="utf-8", errors="surrogateescape")
             print(path)
             if arguments.pdf:
                 print(path.with_suffix(".pdf"))

@@ -6,6 +6,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 
 import drawing
 from drawing import INK, OPTIONS, plt, width_of, wrapped
+from signorini_files import whole
 from table import text_of
 
 # A4, its margins, and the space between blocks, inches.
@@ -110,7 +111,7 @@ def pages_of(path):
     """Pages for a PDF, and pictures for them."""
     before = dict(vars(OPTIONS))
     try:
-        with PdfPages(path) as pdf:
+        with whole(path) as part, PdfPages(part) as pdf:
             pages = Pages(pdf)
             yield pages
             pages.end()

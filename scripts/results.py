@@ -47,7 +47,7 @@ class ResultError(Exception):
 
 
 @contextmanager
-def telling():
+def telling(folder=None):
     """Prints problems of reading results or writing pictures in one line, and collects them in the returned list."""
     problems = []
     try:
@@ -57,7 +57,10 @@ def telling():
     except MemoryError:
         sys.exit("error: not enough memory for these results; raise the limit (ulimit -v), or choose fewer folders")
     except OSError as error:
-        problems.append(f"{error.filename or 'output'}: {error.strerror}")
+        problems.append(f"{error.filename or 'standard output'}: {error.strerror}")
+    except Exception as error:
+        problems.append(f"{folder or 'these results'}: not as `run` writes results ({type(error).__name__}: {error}); run the "
+                        "scene again")
     for problem in problems:
         print(f"error: {problem}", file=sys.stderr)
 

@@ -77,7 +77,7 @@ def draw_setting(results, _limits, figure=None):
                           path_effects=[withStroke(linewidth=2.5, foreground="white")], zorder=4.5)
         _draw_body_force(axes, results, time)
         for colour, words in entries:
-            axes.plot([], [], color=colour, linewidth=4, label=words.replace("$", r"\$"))
+            axes.plot([], [], color=colour, linewidth=4, label=words)
         legend(axes, below, handlelength=1)
 
     loads = f"; loads at {replace(results, time=time).moment}" if largest or "body" in results.scene else ""

@@ -34,6 +34,9 @@ from types import SimpleNamespace
 import meshio
 import numpy as np
 
+from signorini_files import whole
+from signorini_summaries import COLUMNS, read_summary, rows_of, summary_of, unknown
+
 # Names of components: the array of a frame, and the column in it.
 COMPONENTS = {
     "u_x": ("displacement", 0), "u_y": ("displacement", 1),
@@ -42,6 +45,8 @@ COMPONENTS = {
 }
 # Names of strains, ½(∂u_i/∂x_j + ∂u_j/∂x_i), and the indices i, j.
 STRAINS = {"strain_xx": (0, 0), "strain_yy": (1, 1), "strain_xy": (0, 1)}
+# The end of a frame for gmsh.
+WRITTEN = b"$Comments\nA frame of signorini.\n$EndComments\n"
 # A point is in a triangle if its barycentric coordinates are not smaller.
 OUTSIDE = -1e-9
 # The largest number of pairs of points and triangles that are tried at once.
@@ -58,7 +63,7 @@ def run(scene, *options, out=None, **overrides):
 
     The scene is a path, an open file, or a dict with the tables of a scene; files that it names are beside it, those of a
     dict in the current folder. `options` are those of `signorini run`. Overrides are keys of the scene: `material={"young": 2e5}`, or with points
-    `**{"material.young": 2e5}`. The program is the variable SIGNORINI, `signorini` in the path, or that of a clone. A
+    `**{"material.young": 2e5}`. The program is the variable SIGNORINI, `signorini` in the path, or that of the clone of this module. A
     notebook shows the progress if tqdm is there.
     """
     sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
@@ -70,8 +75,8 @@ def run(scene, *options, out=None, **overrides):
 
 def _call(*arguments):
     """Calls the program."""
-    clones = (Path(__file__).resolve().parents[1], Path())
-    places = [os.environ.get("SIGNORINI", "signorini"), *(str(clone / "target/release/signorini") for clone in clones)]
+    clone = Path(__file__).resolve().parents[1]
+    places = [os.environ.get("SIGNORINI", "signorini"), str(clone / "target/release/signorini")]
     program = next(filter(None, map(shutil.which, places)), None)
     if program is None:
         raise RuntimeError("the program signorini was not found; put it into PATH, or set SIGNORINI to its path")
@@ -141,9 +146,10 @@ def _keys(overrides, prefix=""):
 def table(folders, columns=None):
     """A pandas frame with a row per folder (or its Run): the settings in which the runs differ, and columns of summary.json with
     their bars, as `signorini table` prints them. Its `attrs["units"]` are the units by column."""
-    import pandas
-
-    from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError("table() needs pandas (Debian: apt install python3-pandas); `signorini table` prints the same") from None
 
     folders = [getattr(folder, "folder", folder) for folder in folders]
     summaries, columns = [summary_of(folder) for folder in folders], list(columns or COLUMNS)
@@ -165,7 +171,7 @@ class Run:
 
     def __init__(self, folder):
         self.folder = Path(folder)
-        self.summary = json.loads((self.folder / "summary.json").read_text(encoding="utf-8"))
+        self.summary = read_summary(self.folder / "summary.json")
 
     @property
     def figures(self):
@@ -218,7 +224,10 @@ class Run:
     def matrices(self, time=None):
         """The matrices and vectors of the last step, or of the first one that reaches `time`, by name: K, M, L, f, A, a, B,
         g, u, zeta, zeta_before, b; nodes and triangles; `about`, their meanings. `signorini export` runs the scene again."""
-        from scipy.io import mmread
+        try:
+            from scipy.io import mmread
+        except ImportError:
+            raise ImportError("matrices() needs scipy (Debian: apt install python3-scipy)") from None
 
         with tempfile.TemporaryDirectory() as folder:
             until = () if time is None else ("--time", str(time))
@@ -308,7 +317,7 @@ class Plot:
                              extend="max" if peaks else "neither")
         axes.set(aspect="equal", xlabel=f"x ({self.units['length']})", ylabel=f"y ({self.units['length']})",
                  title=f"t = {frame.time:g} {self.units['time']}")
-        return axes
+        return _plain(axes)
 
     def pressure(self, time=None, axes=None):
         """The contact pressure along each foundation."""
@@ -323,7 +332,14 @@ class Plot:
         axes.set(xlabel=f"along the foundation ({self.units['length']})", ylabel=f"pressure ({self.units['stress']})",
                  title=f"t = {frame.time:g} {self.units['time']}")
         axes.legend()
-        return axes
+        return _plain(axes)
+
+
+def _plain(axes):
+    """Axes whose texts, which contain names and units, are no mathematics; those of their colour bars also."""
+    for text in axes.figure.findobj(lambda of: hasattr(of, "set_parse_math")):
+        text.set_parse_math(False)
+    return axes
 
 
 class Frame:
@@ -366,12 +382,15 @@ class Frame:
         return np.array(places[:-1]), np.array(values[:-1])
 
     def to_gmsh(self, path):
-        """Writes the frame as .msh for gmsh, which takes scalars and vectors only. The gap is left out: it is not a
+        """Writes the frame as .msh for gmsh; another file is not replaced. gmsh takes scalars and vectors only. The gap is left out: it is not a
         number off Γ_C."""
         data = {name: values for name, values in self.mesh.point_data.items()
                 if values.shape[1:] in ((), (3,)) and np.isfinite(values).all()}
         data |= {name: self.field(name) for name in COMPONENTS}
-        meshio.write(path, meshio.Mesh(self.mesh.points, self.mesh.cells, data), file_format="gmsh")
+        with whole(path, lambda there: there.read_bytes().endswith(WRITTEN)) as part:
+            meshio.write(part, meshio.Mesh(self.mesh.points, self.mesh.cells, data), file_format="gmsh")
+            with open(part, "ab") as file:
+                file.write(WRITTEN)
 
     def at(self, points, name):
         """A field, or a strain, at a point or at points (k, 2); NaN outside the body. Sides count as straight. Strains

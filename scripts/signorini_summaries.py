@@ -3,6 +3,7 @@
 import difflib
 import json
 import sys
+from math import inf
 from pathlib import Path
 
 # The columns of a table, by default.
@@ -14,15 +15,57 @@ FLAGS = (".singular", ".unresolved")
 UNITS = {"end_time": "time", "stopped_at": "time", "wall_seconds": "s", "seconds_per_step": "s", "peak_megabytes": "MB"}
 
 
+# The entries of summary.json that scripts read. A list and a table under "*" have entries of one kind; NUMBER may be null.
+NUMBER, TEXT, PLACE = (float, int, type(None)), (str, type(None)), ([(float, int)], type(None))
+GOVERNING = {"value": (float, int), "time": (float, int), "at": PLACE}
+FIGURE = {"label": str, "unit": str, "value": NUMBER, "bar": NUMBER, "at": PLACE, "singular": TEXT, "unresolved": TEXT,
+          "governing": (GOVERNING, type(None))}
+VELOCITY = {"centre": [(float, int)], "translation": [(float, int)], "rotation": (float, int)}
+# These have all their entries.
+COMPLETE = (GOVERNING, FIGURE, VELOCITY)
+KINDS = {
+    "title": str, "scene": str, "solver": str, "error": TEXT, "steps": int, "end_time": NUMBER, "stopped_by": TEXT,
+    "stopped_at": NUMBER, "stopped_uncertainty": NUMBER, "wall_seconds": NUMBER, "notes": [str], "units": {"*": str},
+    "phases": {"*": (float, int)}, "kkt": ({"*": NUMBER}, type(None)), "figures": {"*": FIGURE},
+    "boundaries": {"*": [[[(float, int)]]]}, "provenance": {"command": [str], "machine": {}},
+    "collapse": ({"motion": str, "velocity": VELOCITY}, type(None)), "errors": ({}, type(None)),
+}
+
+
+def is_of(kind, value):
+    """Whether a value is of a kind: a type, one of several kinds, a list, or a table, of which known entries are checked."""
+    if isinstance(kind, tuple):
+        return any(is_of(one, value) for one in kind)
+    if isinstance(kind, list):
+        return isinstance(value, list) and all(is_of(kind[0], of) for of in value)
+    if isinstance(kind, dict):
+        return (isinstance(value, dict) and (kind not in COMPLETE or kind.keys() <= value.keys())
+                and all(is_of(kind.get(key, kind.get("*", object)), of) for key, of in value.items()))
+    return isinstance(value, kind) and (kind not in (int, float) or not isinstance(value, bool) and abs(value) < inf)
+
+
+def read_summary(path):
+    """The contents of a file summary.json; a ValueError names what is wrong there."""
+    def refuse(constant):
+        raise ValueError(constant)
+
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+    except (ValueError, RecursionError):
+        raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
+    wrong = next((key for key, kind in KINDS.items() if not is_of({key: kind}, summary)), None)
+    if wrong or "steps" not in summary:
+        raise ValueError(f"{path}: {wrong or 'steps'} is not as `run` writes it; run the scene again")
+    return summary
+
+
 def summary_of(folder):
     """summary.json of a folder, or a ValueError with the reason."""
     path = Path(folder) / "summary.json"
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return read_summary(path)
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}; name folders of results") from None
-    except ValueError:
-        raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
 
 
 def folders_of(names):

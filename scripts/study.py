@@ -31,12 +31,13 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from signorini_files import check, whole
 from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
 
 # The column of --cases that names the runs.
 LABEL = "label"
-# The longest name of a folder.
+# The longest name of a folder, bytes.
 LONGEST = 120
 
 
@@ -79,7 +80,10 @@ def cases_of(path):
     if "\0" in text:
         refuse("is not in UTF-8; save the file in this encoding")
     reader = csv.reader(text.splitlines())
-    lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
+    try:
+        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
+    except csv.Error as error:
+        refuse(f"line {reader.line_num}: {error}")
     if len(lines) < 2:
         refuse("needs a head with keys, and a row for each run")
     (first, head), *rows = lines
@@ -112,18 +116,19 @@ def names_for(runs):
         return re.sub(r"[^\w.=+-]", "_", ",".join(parts).replace(",", "__")) or "run"
 
     counts = Counter(map(plain, runs))
-    return [name if len(name) <= LONGEST and counts[name] == 1
-            else f"{name[:LONGEST - 9]}-{zlib.crc32(str(run).encode()):08x}"
+    return [name if len(name.encode()) <= LONGEST and counts[name] == 1
+            else f"{name.encode()[:LONGEST - 9].decode(errors='ignore')}-{zlib.crc32(str(run).encode()):08x}"
             for run, name in zip(runs, map(plain, runs))]
 
 
 def inputs_of(scene):
     """The scene's file, its mesh or geometry, and its tables; those that exist."""
     scene = Path(scene)
-    text = scene.read_text(encoding="utf-8") if scene.exists() else ""
+    text = scene.read_text(encoding="utf-8", errors="replace") if os.path.exists(scene) else ""
     names = re.findall(r"""["']([^"'()]+\.\w+)["']|(?:table|spline|pchip)\(["']([^"']+)["']""", text)
     files = [scene, *(scene.parent / name for pair in names for name in pair if name)]
-    return [file for file in files if file.exists()]
+    # A text may be too long for a name.
+    return [file for file in files if os.path.exists(file)]
 
 
 def command_of(scene, folder, chosen, more):
@@ -147,9 +152,23 @@ def is_complete(folder, command, inputs):
 
 def outcome(folder, error):
     """The summary of a run of the study, or only its error if the run was refused."""
-    summary = summary_of(folder) if (folder / "summary.json").exists() else {}
+    summary = summary_of(folder) if os.path.exists(folder / "summary.json") else {}
     lines = [line.removeprefix("error: ") for line in error.splitlines() if line.startswith("error")]
     return summary if not error or "error" in summary else {"error": " ".join(lines) or error}
+
+
+def is_of_study(path):
+    """Whether a file stands in the folder of a study: there is an empty file `.locks`."""
+    locks = path.with_name(".locks")
+    return locks.is_file() and not locks.is_symlink() and not locks.stat().st_size
+
+
+def own(out):
+    """Makes the folder of a study; returns its file `.locks`, open."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name in (".locks", "study.csv"):
+        check(out / name, is_of_study)
+    return open(out / ".locks", "ab")
 
 
 @contextmanager
@@ -208,13 +227,12 @@ def run_all(out, everything, inputs, jobs, columns):
         warn_of_columns(columns, first)
     running = set()
     print(f"{len(everything)} runs, {done} of them complete", flush=True)
-    out.mkdir(parents=True, exist_ok=True)
 
     def attempt(of):
         with claim(locks, of[0]) as is_free:
             return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], jobs, running)
 
-    with open(out / ".locks", "wb") as locks:
+    with own(out) as locks:
         while open_runs:
             later = {}
             with ThreadPoolExecutor(jobs) as pool, stopping(pool, running):
@@ -276,7 +294,8 @@ def main(prog=None):
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
     rows, units = rows_of(folders, summaries, arguments.columns or COLUMNS, list(map(dict, chosen)))
     printed(rows, units)
-    write_table(rows, out / "study.csv", units)
+    with whole(out / "study.csv", is_of_study) as part:
+        write_table(rows, part, units)
     print(out / "study.csv")
     is_refused = refused(arguments.columns, list(filter(None, summaries)))
     return 1 if failed else 2 if is_refused else 0

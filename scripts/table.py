@@ -21,7 +21,10 @@ def text_of(value):
 
 def names_of(text):
     """The names in a list with commas, as in CSV: a name with a comma stands in double quotes."""
-    return named(next(csv.reader([text], skipinitialspace=True), []))
+    try:
+        return named(next(csv.reader([text], skipinitialspace=True), []))
+    except csv.Error as error:
+        raise argparse.ArgumentTypeError(f"no list of names with commas: {error}") from None
 
 
 def write_rows(rows, file, units=None):

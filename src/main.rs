@@ -4,8 +4,17 @@
 mod command;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use signorini::interrupt;
-use std::{path::PathBuf, process::ExitCode};
+use command::Failure;
+use signorini::{
+    interrupt,
+    output::terminal::{keep, lost},
+    printable::printable,
+};
+use std::{
+    env,
+    path::PathBuf,
+    process::{self, ExitCode},
+};
 
 /// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
 #[derive(Parser)]
@@ -88,7 +97,7 @@ fn main() -> ExitCode {
     if let Err(error) = interrupt::install() {
         command::tell("warning", &format!("no handlers for signals: {error}"));
     }
-    let result = match Arguments::parse().command {
+    let result = match Arguments::try_parse().unwrap_or_else(refuse).command {
         Command::Run(arguments) => command::run(&arguments),
         Command::New { name } => command::new(&name),
         Command::Check(arguments) => command::check(&arguments),
@@ -105,11 +114,21 @@ fn main() -> ExitCode {
         Command::Man { folder } => command::man(&folder, Arguments::command()),
         Command::Mesh { scenes, set } => command::mesh(&scenes, &set),
     };
-    match result {
+    let lost = lost().map_or(Ok(()), |error| Err(Failure::from(error)));
+    match result.and(lost) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.message.iter().for_each(|message| command::tell("error", message));
             ExitCode::from(failure.code)
         }
     }
+}
+
+/// Prints an error of the arguments, or the help, and exits. The error shows the arguments as the terminal may have them.
+fn refuse(error: clap::Error) -> Arguments {
+    let words = env::args_os().map(|word| printable(&word.to_string_lossy()));
+    let error = Arguments::try_parse_from(words).err().unwrap_or(error);
+    keep(error.print());
+    lost().iter().for_each(|error| command::tell("error", error));
+    process::exit(if lost().is_some() { 1 } else { error.exit_code() })
 }

@@ -1,7 +1,7 @@
 //! Whole files: text in UTF-8, and files that appear complete or not at all.
 
 use std::{
-    fs::{File, Permissions},
+    fs::{self, File, Permissions},
     io::{self, Write},
     os::unix::fs::PermissionsExt,
     path::Path,
@@ -24,7 +24,13 @@ pub(crate) fn text(bytes: Vec<u8>) -> Result<String, String> {
 }
 
 /// The names of incomplete files begin with this.
-pub(crate) const PARTIAL: &str = ".partial-";
+pub(crate) const PARTIAL: &str = ".signorini-partial-";
+
+/// The rule of all writers: a file may stand where nothing is, or where a file is that this program has written. It writes no
+/// links.
+pub(crate) fn is_free(path: &Path, is_own: impl FnOnce() -> bool) -> bool {
+    fs::symlink_metadata(path).map_or(true, |there| there.is_file() && is_own())
+}
 
 /// Writes a file with the usual permissions: a complete temporary file beside it is renamed. `complete` may do more with
 /// it before.

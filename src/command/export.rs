@@ -9,12 +9,16 @@ use signorini::{
     evolution::{RunError, Step},
     fem::{DamageSystem, NodalBases, Stiffness, source, source_load},
     model::Fremond,
-    output::{create, terminal::say, write_whole},
+    output::{check_is_own, create, terminal::say, write_whole},
     petsc::{Matrix, PetscError, Session},
     problem::{DiscreteProblem, LoadCase, State},
     scene::rounded,
 };
-use std::{fs, iter::zip, path::PathBuf};
+use std::{
+    fs,
+    iter::zip,
+    path::{Path, PathBuf},
+};
 
 /// Arguments of `signorini export`.
 #[derive(Args)]
@@ -27,6 +31,37 @@ pub struct ExportArguments {
     /// Folder for the files.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+}
+
+/// All files that an export may have.
+const FILES: [&str; 16] = [
+    "K.mtx",
+    "A.mtx",
+    "B.mtx",
+    "u_D.mtx",
+    "g.mtx",
+    "f.mtx",
+    "u.mtx",
+    "zeta.mtx",
+    "nodes.csv",
+    "triangles.csv",
+    "M.mtx",
+    "L.mtx",
+    "source.mtx",
+    "zeta_before.mtx",
+    "export.json",
+    "README.md",
+];
+
+/// The names of the files that an earlier export has left in a folder.
+fn earlier(out: &Path) -> Vec<String> {
+    let about = fs::read(out.join("export.json")).unwrap_or_default();
+    let about: serde_json::Value = serde_json::from_slice(&about).unwrap_or_default();
+    if about.get("kappa").is_none() {
+        return Vec::new();
+    }
+    let files = about["files"].as_array().into_iter().flatten().filter_map(|name| name.as_str());
+    files.chain(["export.json", "README.md"]).map(str::to_owned).collect()
 }
 
 /// The name of a file and its content.
@@ -46,6 +81,12 @@ pub fn export(arguments: &ExportArguments) -> Result<(), Failure> {
 
 fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let ExportArguments { scene, time, out } = arguments;
+    let earlier = earlier(out);
+    let is_own = |name: &str| earlier.iter().any(|known| known == name);
+    FILES
+        .iter()
+        .try_for_each(|name| check_is_own(&out.join(name), || is_own(name)))
+        .map_err(Failure::input)?;
     let (mut scene, _) = scene.read(&[])?;
     let mesh = read_mesh(&scene, true)?;
     let (_, mesh) = accuracy_loop(session, &mut scene, mesh, (false, None))?;
@@ -77,10 +118,8 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     files.push(("README.md", include_str!("export.md").to_owned()));
     create(out).map_err(Failure::input)?;
     // An earlier export may have files that this one has not.
-    let before = fs::read(out.join("export.json")).unwrap_or_default();
-    let before: serde_json::Value = serde_json::from_slice(&before).unwrap_or_default();
-    let stale = before["files"].as_array().into_iter().flatten().filter_map(|name| name.as_str());
-    let stale = stale.filter(|name| name.ends_with(".mtx") && !name.contains('/'));
+    let is_new = |name: &str| files.iter().any(|(new, _)| *new == name);
+    let stale = FILES.iter().filter(|name| is_own(name) && !is_new(name));
     stale.for_each(|name| drop(fs::remove_file(out.join(name))));
     files.iter().try_for_each(|(name, text)| write_whole(&out.join(name), text.as_bytes()))?;
     let end = rounded(states[0].time);

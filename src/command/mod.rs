@@ -36,12 +36,12 @@ use signorini::{
     interrupt::{Signal, received},
     mesh::{self, Format, Mesh},
     output::terminal::say,
+    printable::print_error,
     problem::{Figure, Figures},
     scene::{MeshSource, SCHEMA, Scene, Units},
 };
 use std::{
     fmt,
-    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -71,11 +71,9 @@ impl<E: fmt::Display> From<E> for Failure {
     }
 }
 
-/// Prints an error or another `kind` of message in one write, so that the output of other ranks and of
-/// `mpiexec` cannot interrupt it.
+/// Prints an error or another `kind` of message.
 pub fn tell(kind: &str, text: &str) {
-    // If stderr is closed, the exit code still reports the failure.
-    let _ = io::stderr().write_all(format!("{kind}: {text}\n").as_bytes());
+    print_error(&format!("{kind}: {text}"));
 }
 
 /// Checks PETSc options before the results of an earlier run are removed.

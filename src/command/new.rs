@@ -2,7 +2,7 @@
 
 use super::Failure;
 use signorini::output::{terminal::say, write_whole};
-use std::path::Path;
+use std::{fs, path::Path};
 
 const GEOMETRY: &str = include_str!("new.geo");
 const FIRST_SCENE: &str = include_str!("new.toml");
@@ -20,7 +20,9 @@ pub fn new(name: &Path) -> Result<(), Failure> {
         file.push(extension);
         name.with_file_name(file)
     });
-    if let Some(there) = [&geometry, &scene].into_iter().find(|path| path.exists()) {
+    if let Some(there) =
+        [&geometry, &scene].into_iter().find(|path| fs::symlink_metadata(path).is_ok())
+    {
         let there = there.display();
         return Err(Failure::input(format!("{there} is there already; give another name")));
     }

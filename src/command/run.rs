@@ -26,7 +26,7 @@ use signorini::{
     scene::Scene,
 };
 use std::{
-    mem,
+    fs, mem,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -111,7 +111,9 @@ fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
     let kept = folder.join(output::MESH);
     let whose = match scene.accuracy {
         Some(_) if output::is_same_file(&kept, &scene.mesh.file) => "is the mesh of the scene",
-        Some(_) if kept.exists() && !output::is_adapted(&kept) => "was left there by no run",
+        Some(_) if fs::symlink_metadata(&kept).is_ok() && !output::is_adapted(&kept) => {
+            "was left there by no run"
+        }
         _ => return Ok(()),
     };
     Err(Failure::input(format!(

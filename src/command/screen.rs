@@ -6,15 +6,11 @@ use signorini::{
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     output::terminal::{Progress, plain, say, with_bar},
     petsc::Communicator,
+    printable::print_error,
     problem::{Collapse, in_words},
     scene::{Scene, Scheme, Stepping, TimeGrid, rounded},
 };
-use std::{
-    io::{self, Write},
-    num::NonZero,
-    thread,
-    time::Instant,
-};
+use std::{num::NonZero, thread, time::Instant};
 
 /// The length of the progress bar: it counts parts of [0, T], as many as a run may have steps.
 const LENGTH: u64 = 1_000_000_000;
@@ -89,7 +85,7 @@ fn adapting(mesh: &Adapted, accuracy: f64) {
         errors.collect::<Vec<_>>().join(", "),
         percent(accuracy)
     );
-    let _ = writeln!(io::stderr(), "{}", row("adapting", text));
+    print_error(&row("adapting", text));
 }
 
 /// Shows what the rounds to come may need, after the first one has taken `seconds`. The error of quadratic elements on
@@ -101,7 +97,7 @@ fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
     let (seconds, megabytes) = (15.0 * growth * seconds, 50.0 + 0.011 * unknowns);
     let [unknowns, seconds] = [unknowns, seconds].map(|number| plain(number, 1));
     let text = format!("roughly {unknowns} unknowns, {seconds} s, {megabytes:.0} MB");
-    let _ = writeln!(io::stderr(), "{}", row("expected", text));
+    print_error(&row("expected", text));
 }
 
 /// Shows an accepted step of a run to t = `end`.

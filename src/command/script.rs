@@ -2,7 +2,7 @@
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
-use signorini::python::python;
+use signorini::python::{ISOLATED, python};
 use std::{
     collections::BTreeMap, env, ffi::OsString, io::Seek, os::unix::process::CommandExt,
     process::Command,
@@ -16,10 +16,10 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-const SCRIPTS: [(&str, &str); 25] = scripts! {
+const SCRIPTS: [(&str, &str); 26] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
     "histories" "info" "limits" "lines" "maps" "paraview_script" "paraview_view" "principal" "reading" "report"
-    "report_pdf" "results" "setting" "signorini_results" "signorini_summaries" "study" "table"
+    "report_pdf" "results" "setting" "signorini_files" "signorini_results" "signorini_summaries" "study" "table"
 };
 /// The template of the report, for `report`.
 const REPORT: (&str, &str) = ("report.html", include_str!("../../scripts/report.html"));
@@ -48,14 +48,16 @@ pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Re
         let folder = env::temp_dir();
         format!("{}: {error}; set TMPDIR to another folder for temporary files", folder.display())
     })?;
-    // Python takes the place of this process, and gets its signals.
-    let error = Command::new(&python)
+    // Python takes the place of this process, and gets its signals. It would answer Ctrl-C with a traceback until the script
+    // handles it: so Ctrl-C has no effect before.
+    let error = Command::new("sh")
+        .args(["-c", "trap '' INT; exec \"$@\"", "sh"])
+        .arg(&python)
+        .args(ISOLATED)
         .args(["-c", EMBEDDED, name])
         .args(arguments)
         // `compare` runs this program.
         .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
-        // The sources and their output are UTF-8, except paths, which may be any bytes.
-        .env("PYTHONIOENCODING", "utf-8:surrogateescape")
         .stdin(sources)
         .exec();
     Err(Failure::from(format!("{}: {error}", python.display())))

@@ -1,7 +1,7 @@
 //! Converts meshes of other programs to MSH 4.1 with Python.
 
 use super::{MeshError, gmsh::note};
-use crate::python::python;
+use crate::python::{ISOLATED, python};
 use std::{path::Path, process::Command};
 
 /// The Python program that writes a mesh as MSH 4.1.
@@ -15,7 +15,7 @@ pub fn run(path: &Path) -> Result<Vec<u8>, MeshError> {
     let python = python(&["meshio"]).or_else(|problem| python(&[]).map_err(|_| problem));
     let python = python.map_err(|problem| MeshError::file(path, problem))?;
     let mut command = Command::new(&python);
-    command.args(["-c", SCRIPT]).arg(path).env("PYTHONIOENCODING", "utf-8");
+    command.args(ISOLATED).args(["-c", SCRIPT]).arg(path);
     let made = command.output().map_err(MeshError::io(Path::new(&python)))?;
     let said = String::from_utf8_lossy(&made.stderr);
     let last = said.trim().lines().last().unwrap_or("the conversion failed");

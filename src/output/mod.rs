@@ -25,6 +25,7 @@ use growing_file::GrowingFile;
 use serde::Serialize;
 use std::{
     fs::{self, File, TryLockError},
+    io::Read,
     path::{Path, PathBuf},
 };
 
@@ -69,11 +70,31 @@ pub fn check_is_writable(folder: &Path) -> Result<(), OutputError> {
 /// The scene of the run. It replaces the file of an earlier run, which may be the present scene itself.
 pub const SCENE: &str = "scene.toml";
 
+/// The first words of a checkpoint.
+pub const CHECKPOINT: &str = "signorini checkpoint";
+
 /// The adapted mesh.
 pub const MESH: &str = "mesh.msh";
 /// The last line of an adapted mesh.
 pub const ADAPTED: &str =
     "$Comments\nAdapted by signorini for the results beside it.\n$EndComments\n";
+
+/// Refuses a place for a file where something is that this program did not write.
+///
+/// # Errors
+/// The message names the place.
+pub fn check_is_own(path: &Path, is_own: impl FnOnce() -> bool) -> Result<(), OutputError> {
+    let reason = "no run left it there; choose another folder with --out, or move it away";
+    let refused = || OutputError::new(path, reason);
+    whole_file::is_free(path, is_own).then_some(()).ok_or_else(refused)
+}
+
+/// Whether a file begins with these bytes.
+fn begins(path: &Path, start: &str) -> bool {
+    let mut first = Vec::new();
+    let read = File::open(path).and_then(|f| f.take(start.len() as u64).read_to_end(&mut first));
+    read.is_ok() && first == start.as_bytes()
+}
 
 /// Creates `folder` and locks it against other runs, until the returned file is dropped (flock(2); some file
 /// systems have no locks).
@@ -83,17 +104,13 @@ pub const ADAPTED: &str =
 /// with the name of a result. Folders of earlier runs contain their scene.
 pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     create(folder)?;
-    let scene = folder.join(SCENE);
-    let foreign = match fs::read_to_string(&scene) {
-        Ok(text) if AsRun::is_text(&text) => None,
-        Ok(_) => Some(scene),
-        Err(_) => {
-            files(folder)?.into_iter().find_map(|(name, path)| is_result(&name).then_some(path))
+    let is_own = fs::read_to_string(folder.join(SCENE)).is_ok_and(|text| AsRun::is_text(&text));
+    for (name, path) in files(folder)? {
+        if checkpoint(&name).is_some() {
+            check_is_own(&path, || begins(&path, CHECKPOINT))?;
+        } else if name == SCENE || is_result(&name) {
+            check_is_own(&path, || is_own)?;
         }
-    };
-    if let Some(file) = foreign {
-        let reason = "no run left it there; choose another folder with --out, or move it away";
-        return Err(OutputError::new(&file, reason));
     }
     let file = File::open(folder).map_err(|e| OutputError::new(folder, e))?;
     match file.try_lock() {
@@ -185,7 +202,8 @@ pub fn copy(from: &Path, to: &Path, copies: &[(String, PathBuf)]) -> Result<(), 
 
 /// Whether `file` is the adapted mesh of a run.
 pub fn is_adapted(file: &Path) -> bool {
-    fs::read_to_string(file).is_ok_and(|text| text.ends_with(ADAPTED))
+    fs::symlink_metadata(file).is_ok_and(|there| there.is_file())
+        && fs::read_to_string(file).is_ok_and(|text| text.ends_with(ADAPTED))
 }
 
 /// Whether both paths lead to one file.

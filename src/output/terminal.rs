@@ -2,16 +2,32 @@
 
 pub use comfy_table::presets::ASCII_MARKDOWN as MARKDOWN;
 
+use crate::printable::{print_error, printable};
 use comfy_table::{CellAlignment, Table, TableStyle};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     io::{self, Write},
+    sync::OnceLock,
     time::{Duration, Instant},
 };
 
-/// Prints to standard output. It is no error if the reader of a pipe has gone (`… | head`).
+/// The first error of writing to standard output.
+static LOST: OnceLock<io::Error> = OnceLock::new();
+
+/// Prints to standard output. [`lost`] has the error of it.
 pub fn say(text: &str) {
-    let _ = writeln!(io::stdout(), "{text}");
+    keep(writeln!(io::stdout(), "{}", printable(text)));
+}
+
+/// Keeps the error of an output for [`lost`]. It is no error if the reader of a pipe has gone (`… | head`).
+pub fn keep(written: io::Result<()>) {
+    let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::BrokenPipe;
+    written.err().filter(|error| !is_gone(error)).into_iter().for_each(|e| drop(LOST.set(e)));
+}
+
+/// The error if a part of the output could not be written.
+pub fn lost() -> Option<String> {
+    LOST.get().map(|error| format!("standard output: {error}"))
 }
 
 /// The smallest error bar that is shown, over its figure.
@@ -92,7 +108,7 @@ impl Progress {
             self.bar.set_message(fitting(&fields, columns.saturating_sub(LEAST_BAR)));
         } else if self.last_line.elapsed() > BETWEEN_LINES {
             self.last_line = Instant::now();
-            let _ = writeln!(io::stderr(), "{}", fitting(&fields, usize::MAX));
+            print_error(&fitting(&fields, usize::MAX));
         }
     }
 

@@ -121,7 +121,8 @@ fn initialize(options: &[String]) -> Result<(), PetscError> {
     set_missing(&[("SCOTCH_PTHREAD_NUMBER", "1")]);
     let singleton = Communicator::launched().is_none();
     let temporary = if singleton { set_missing(&SINGLETON) } else { Vec::new() };
-    let own = ["signorini", "-no_signal_handler"].into_iter();
+    // A file .petscrc in the current folder could load libraries of strangers.
+    let own = ["signorini", "-no_signal_handler", "-skip_petscrc"].into_iter();
     let arguments = own.chain(options.iter().map(String::as_str));
     let pointers = arguments.map(|argument| c_string(argument).map(CString::into_raw));
     let mut pointers: Vec<*mut c_char> = pointers.collect::<Result<_, _>>()?;

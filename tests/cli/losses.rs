@@ -65,9 +65,11 @@ fn files_may_not_become_larger() {
 #[test]
 fn what_a_killed_run_left_unfinished_goes_with_the_next() {
     let directory = TestDirectory::new();
-    directory.write("out/scene/.partial-abc", "half a frame");
+    directory.write("out/scene/.signorini-partial-abc", "half a frame");
+    directory.write("out/scene/.partial-x", "of the user");
     directory.run(&["--set", "time.end=0.1"]);
-    assert!(!directory.path("out/scene/.partial-abc").exists());
+    assert!(!directory.path("out/scene/.signorini-partial-abc").exists());
+    assert_eq!(directory.read("out/scene/.partial-x"), "of the user");
 }
 
 #[test]

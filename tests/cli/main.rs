@@ -9,6 +9,7 @@ mod tutorial;
 mod check;
 mod compare;
 mod constants;
+mod doors;
 mod export;
 mod extremes;
 mod failing;

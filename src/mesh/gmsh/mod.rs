@@ -87,7 +87,7 @@ fn kept(
     order: Order,
 ) -> Result<Mesh, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
-    let is_script = geo.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("geo"));
+    let is_script = process::is_script(geo);
     if is_script && text.contains('\0') {
         return Err(MeshError::file(geo, "is in UTF-16 or no text; save the file in UTF-8"));
     }
@@ -136,8 +136,7 @@ fn kept(
         _ => convert::run(geo)?,
     };
     let mesh = parse_made(&bytes, geo)?;
-    let is_free = fs::symlink_metadata(&path).is_err();
-    if is_free || origin.is_some() {
+    if whole_file::is_free(&path, || origin.is_some()) {
         let origin = [&*digest, &gmsh.unwrap_or_default()];
         let signed = [&bytes, cache::signature(&bytes, origin).as_bytes()].concat();
         if let Err(error) = whole_file::write(&path, &signed, |_| Ok(())) {

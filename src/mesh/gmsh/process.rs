@@ -2,12 +2,14 @@
 
 use crate::interrupt::{Interrupts, received};
 use crate::mesh::{MeshError, msh::is_complete};
+use crate::printable::print_error;
 use std::{
     collections::HashSet,
     env,
     ffi::OsString,
     fs::{self, File},
-    io::{self, Write},
+    io,
+    os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::{Child, Command, ExitStatus, Stdio},
     thread::sleep,
@@ -37,6 +39,11 @@ const TRIANGLES_PER_SQUARE: f64 = 2.31;
 /// The command that writes gmsh's version, as [`Mesh::gmsh`](crate::mesh::Mesh::gmsh) has it.
 const VERSION: &str =
     "Printf(\"gmsh %g.%g.%g\", GMSH_MAJOR_VERSION, GMSH_MINOR_VERSION, GMSH_PATCH_VERSION)";
+
+/// Whether gmsh runs this file as a program.
+pub fn is_script(file: &Path) -> bool {
+    file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("geo"))
+}
 
 /// Runs gmsh with `arguments` on the file `input` and then on a file with the text `last`. Returns the bytes
 /// of the MSH 4.1 file that gmsh makes, with gmsh's version as a comment at its end. If `bytes` are given, they replace
@@ -70,7 +77,19 @@ pub fn run(
             command.arg(copy);
         }
         // Without "./" gmsh would take a path that begins with a dash for an option.
-        None => drop(command.arg(Path::new(".").join(input))),
+        None if is_script(input) => drop(command.arg(Path::new(".").join(input))),
+        // gmsh would run a file with an ending in other letters, as .Step, and options beside it, as scripts.
+        None => {
+            let ending = input.extension().unwrap_or_default().to_ascii_lowercase();
+            let link = scratch.path().join("geometry").with_extension(ending);
+            let target = fs::canonicalize(input).map_err(MeshError::io(input))?;
+            symlink(target, &link).map_err(MeshError::io(&link))?;
+            command.arg(link);
+        }
+    }
+    // Without a home gmsh would run the scripts .gmshrc and .gmsh-options in the current folder.
+    if env::var_os("HOME").is_none_or(|home| home.is_empty()) {
+        command.env("HOME", "/");
     }
     command.arg(&second);
     // The messages go to a file, as a pipe could fill up while gmsh works.
@@ -119,8 +138,7 @@ pub fn run(
 
 /// Shows the user a note on a file at once.
 pub fn note(file: &Path, text: &str) {
-    // If stderr is closed, the work goes on.
-    let _ = io::stderr().write_all(format!("note: {}: {text}\n", file.display()).as_bytes());
+    print_error(&format!("note: {}: {text}", file.display()));
 }
 
 /// Waits for gmsh. Ends it after the time limit or on a signal to this process.

@@ -1,0 +1,577 @@
+//! Nothing is let in that the user did not start, and nothing of the user's is lost.
+
+use crate::{
+    meshes::GEO,
+    test_directory::{ProgramOutput, SCENE, TestDirectory, signal, square, wait_until},
+};
+use std::{
+    collections::BTreeSet,
+    fs::{self, File, Permissions},
+    os::unix::fs::{PermissionsExt, symlink},
+    process::Stdio,
+    thread::sleep,
+    time::Duration,
+};
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+/// Whoever executes a file of a stranger leaves this file behind.
+const MARK: &str = "MARK";
+
+/// The names of all modules that a script imports, at any place.
+fn imported() -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for path in fs::read_dir(format!("{ROOT}/scripts")).expect("the scripts").flatten() {
+        let text = fs::read_to_string(path.path()).unwrap_or_default();
+        for line in text.lines().filter(|_| path.path().extension().is_some_and(|e| e == "py")) {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let found = match &words[..] {
+                ["import", modules @ ..] => modules,
+                ["from", module, "import", ..] => &[*module],
+                _ => &[],
+            };
+            let top =
+                |name: &&str| name.split('.').next().map(|n| n.trim_end_matches(',').to_owned());
+            names.extend(found.iter().filter_map(top));
+        }
+    }
+    names
+}
+
+/// A folder whose files are named after everything that a program may look for in the current folder. Each leaves the mark.
+fn hostile() -> TestDirectory {
+    let directory = TestDirectory::new();
+    let mark = directory.path(MARK).display().to_string();
+    let module = format!("open({mark:?}, 'a').write(__file__ + '\\n')\n");
+    let names = imported();
+    assert!(
+        ["json", "re", "meshio", "matplotlib", "numpy"].iter().all(|name| names.contains(*name))
+    );
+    let more = ["sitecustomize", "usercustomize", "encodings", "site", "PIL", "h5py", "stranger"];
+    for name in names.iter().map(String::as_str).chain(more) {
+        directory.write(&format!("{name}.py"), &module);
+        directory.write(&format!("{name}/__init__.py"), &module);
+    }
+    let program = format!("#!/bin/sh\necho $0 >> {mark}\n");
+    for name in ["gmsh", "python3", "sh", "git", "ffmpeg", "target/release/signorini"] {
+        directory.write(name, &program);
+        fs::set_permissions(directory.path(name), Permissions::from_mode(0o755)).expect("mine");
+    }
+    directory
+        .write("matplotlibrc", "backend: module://stranger\nanimation.ffmpeg_path: ./ffmpeg\n");
+    for name in [".petscrc", "petscrc"] {
+        directory.write(name, &format!("-log_view ascii:{mark}\n"));
+    }
+    for name in [".gmshrc", ".gmsh-options", "square.step.opt"] {
+        directory.write(name, &format!("SystemCall \"echo {name} >> {mark}\";\n"));
+    }
+    directory.write("square.geo", GEO);
+    directory
+}
+
+/// Every subcommand works in such a folder, also without a home, and executes nothing there.
+#[test]
+fn a_folder_full_of_modules_and_settings_of_strangers() {
+    let directory = hostile();
+    let module = std::process::Command::new("/usr/bin/python3").args(["-c", "import json"]);
+    let _ = { module }.current_dir(directory.path(".")).output();
+    if directory.path("out").exists() || fs::remove_file(directory.path(MARK)).is_err() {
+        // Without this Python the modules prove nothing; the rest of the test does.
+        eprintln!("/usr/bin/python3 is missing");
+    }
+    directory.write("by_gmsh.toml", &SCENE.replace("square.msh", "square.geo"));
+    let inp = "*NODE\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n*ELEMENT,TYPE=CPS3,ELSET=BODY\n1,1,2,3\n2,1,3,4\n\
+               *NSET,NSET=bottom\n1,2\n*NSET,NSET=top\n3,4\n*NSET,NSET=left\n4,1\n";
+    directory.write("square.inp", inp);
+    directory.write("by_inp.toml", &SCENE.replace("square.msh", "square.inp"));
+    let commands: [&[&str]; 18] = [
+        &["run", "scene.toml"],
+        &["run", "by_gmsh.toml", "--accuracy", "0.3"],
+        &["check", "by_inp.toml"],
+        &["mesh", "by_gmsh.toml"],
+        &["info", "out/scene"],
+        &["table", "out/scene"],
+        &["figures", "out/scene", "--mesh", "--evolution"],
+        &["figures", "out/scene", "--animate", "mp4"],
+        &["figures", "out/scene", "--along", "top"],
+        &["figures", "out/scene", "--paraview"],
+        &["report", "out/scene", "--pdf"],
+        &["study", "scene.toml", "--set", "time.end=0.1,0.2"],
+        &["compare", "scene.toml", "--solvers", "active-set"],
+        &["export", "scene.toml", "--out", "matrices"],
+        &["keys"],
+        &["solvers"],
+        &["completions", "bash"],
+        &["new", "dam"],
+    ];
+    for arguments in commands {
+        runs_nothing(&directory, arguments, &[("PYTHONPATH", ".")]);
+    }
+    // Without a home, and without the mesh that was kept.
+    for arguments in
+        [&["mesh", "by_gmsh.toml"][..], &["check", "by_inp.toml"], &["info", "out/scene"]]
+    {
+        directory.write("square.geo", &format!("{GEO}// again\n"));
+        runs_nothing(&directory, arguments, &[("HOME", "")]);
+    }
+}
+
+/// A command works and leaves no mark.
+#[track_caller]
+fn runs_nothing(directory: &TestDirectory, arguments: &[&str], variables: &[(&str, &str)]) {
+    let said = ProgramOutput::of(directory.command(arguments).envs(variables.iter().copied()));
+    assert!(!directory.path(MARK).exists(), "{arguments:?}: {}", directory.read(MARK));
+    let lacks = said.err.contains("apt install");
+    assert!(said.code == Some(0) || lacks, "{arguments:?}: {said:?}");
+}
+
+/// A file runs as a program of gmsh only if it is called .geo: neither the case of an ending, nor the contents, nor a file
+/// beside it decide otherwise.
+#[test]
+fn a_geometry_that_is_a_script() {
+    let directory = TestDirectory::new();
+    let mark = directory.path(MARK).display().to_string();
+    let script = format!("SystemCall \"touch {mark}\";\n{GEO}");
+    let names = [
+        "e.step", "e.Step", "e.STEP", "e.stp", "e.Stp", "e.brep", "e.Brep", "e.BREP", "e.iges",
+        "e.Iges", "e.igs", "e.IGS", "e.Igs", "e.msh", "e.Msh", "e.inp", "e.unv", "e.vtk", "e.vtu",
+        "e.bdf", "e.xdmf", "e.med",
+    ];
+    for name in names {
+        for before in [
+            "",
+            "$Comments\n$EndComments\n",
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n",
+            "$PostFormat\n",
+        ] {
+            directory.write(name, &format!("{before}{script}"));
+            directory.write(&format!("{name}.opt"), &script);
+            let said = directory.say(&["check", "scene.toml", "--mesh", name]);
+            assert_eq!(said.code, Some(2), "{name}: {said:?}");
+            assert!(!directory.path(MARK).exists(), "{name} after {before:?} was executed");
+        }
+    }
+    // The law can fail: a .geo is a program.
+    directory.write("e.geo", &script);
+    directory.say(&["check", "scene.toml", "--mesh", "e.geo"]);
+    assert!(directory.path(MARK).exists());
+}
+
+/// Each writer, with the names of files that it writes, on a folder in which a file of the user, or a link to one, has such
+/// a name: it refuses by name, and changes nothing.
+#[test]
+fn files_and_links_of_the_user_stay_under_every_writer() {
+    let made = TestDirectory::new();
+    made.run(&["--set", "output.checkpoint=0"]);
+    made.say(&["export", "scene.toml", "--out", "matrices"]);
+    let mut results = made.names("out/scene");
+    // One frame is as good as another.
+    results.retain(|name| !name.contains("_000") || name.contains("_0000"));
+    results.push("checkpoint_3_0".to_owned());
+    let writers: [(&[&str], &str, Vec<String>); 5] = [
+        (&["run", "scene.toml", "--out", "mine"], "mine", results),
+        (&["export", "scene.toml", "--out", "mine"], "mine", made.names("matrices")),
+        (
+            &["study", "scene.toml", "--set", "time.end=0.1,0.2", "--out", "mine"],
+            "mine",
+            names(".locks study.csv"),
+        ),
+        (
+            &["compare", "scene.toml", "--solvers", "tao", "--out", "mine"],
+            "mine",
+            names("comparison.csv scene-tao/history.csv scene-tao/scene.toml"),
+        ),
+        (&["new", "mine/dam"], "mine", names("dam.geo dam.toml")),
+    ];
+    for (arguments, folder, names) in writers {
+        for name in names {
+            is_refused(&TestDirectory::new(), arguments, &format!("{folder}/{name}"), true);
+        }
+    }
+}
+
+/// In a folder of results the names of results belong to the program; but it has made no links.
+#[test]
+fn links_in_a_folder_of_results() {
+    let directory = TestDirectory::new();
+    directory.run(&["--set", "output.every=5"]);
+    if directory.say_python(&["info", "out/scene"]).is_none() {
+        return;
+    }
+    let pictures = "setting.png deformed.png stress-damage.png principal-stresses.png pressure.png damage-history.png \
+                    force-displacement.png";
+    let writers: [(&[&str], &str); 7] = [
+        (&["figures", "out/scene"], pictures),
+        (&["figures", "out/scene", "--animate"], "damage.gif pressure.gif"),
+        (
+            &["figures", "out/scene", "--along", "top"],
+            "curves_along_top_von_mises.csv curves_along_top_von_mises.png",
+        ),
+        (&["figures", "out/scene", "--together"], "force-displacement-together.png"),
+        (&["figures", "out/scene", "--paraview"], "open_in_paraview.py"),
+        (&["report", "out/scene", "--pdf"], "report.html report.pdf"),
+        (&["run", "scene.toml"], "history.csv setting.png scene.toml checkpoint_3_0"),
+    ];
+    for (arguments, names) in writers {
+        for name in names.split_whitespace() {
+            let path = format!("out/scene/{name}");
+            let kept = fs::read(directory.path(&path));
+            is_refused(&directory, arguments, &path, false);
+            let _ = fs::remove_file(directory.path(&path));
+            kept.into_iter()
+                .for_each(|content| fs::write(directory.path(&path), content).expect("mine"));
+        }
+    }
+    for _ in 0..2 {
+        let said = directory.say(&["report", "out/scene", "--pdf"]);
+        assert_eq!(said.code, Some(0), "its own files are replaced: {said:?}");
+    }
+    assert!(directory.names("out/scene").iter().all(|name| !name.starts_with('.')));
+    // Without the scene of a run the folder is one of the user.
+    fs::remove_file(directory.path("out/scene/scene.toml")).expect("mine");
+    directory.say(&["report", "out/scene"]).fails(2, &["out/scene/report.html: ", "left it there"]);
+}
+
+fn names(words: &str) -> Vec<String> {
+    words.split_whitespace().map(str::to_owned).collect()
+}
+
+/// A command refuses a file of the user at `path`, and links there, and changes nothing.
+#[track_caller]
+fn is_refused(directory: &TestDirectory, arguments: &[&str], path: &str, with_file: bool) {
+    directory.write("precious", "of the user");
+    directory.write(&format!("{path}/below"), "");
+    let _ = fs::remove_dir_all(directory.path(path));
+    let put: [&dyn Fn(); 3] = [
+        &|| directory.write(path, "of the user"),
+        &|| symlink(directory.path("precious"), directory.path(path)).expect("a link"),
+        &|| symlink(directory.path("absent"), directory.path(path)).expect("a link"),
+    ];
+    for put in &put[if with_file { 0 } else { 1 }..] {
+        let _ = fs::remove_file(directory.path(path));
+        put();
+        let link = fs::read_link(directory.path(path)).ok();
+        let said = directory.say(arguments);
+        if said.err.contains("apt install python3-matplotlib") {
+            return;
+        }
+        assert_eq!(said.code, Some(2), "{path}: {said:?}");
+        assert!(said.err.contains(path), "{path}: {said:?}");
+        assert!(said.err.contains("there"), "{path}: {said:?}");
+        assert_eq!(fs::read_link(directory.path(path)).ok(), link, "{path}");
+        assert_eq!(directory.read("precious"), "of the user", "{path}");
+        assert!(!directory.path("absent").exists(), "{path}");
+        if link.is_none() {
+            assert_eq!(directory.read(path), "of the user");
+        }
+    }
+}
+
+/// What cannot be printed is an error of every command that prints.
+#[test]
+fn a_full_device_as_standard_output() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    let commands: [&[&str]; 20] = [
+        &["run", "scene.toml"],
+        &["check", "scene.toml"],
+        &["mesh", "scene.toml"],
+        &["export", "scene.toml", "--out", "matrices"],
+        &["keys"],
+        &["keys", "--schema"],
+        &["keys", "--figures"],
+        &["solvers"],
+        &["completions", "bash"],
+        &["new", "dam"],
+        &["--help"],
+        &["run", "--help"],
+        &["--version"],
+        &["info", "out/scene"],
+        &["table", "out/scene"],
+        &["figures", "out/scene", "--only", "pressure"],
+        &["report", "out/scene"],
+        &["study", "scene.toml", "--set", "time.end=0.1,0.2"],
+        &["compare", "scene.toml", "--solvers", "tao"],
+        &["study", "--help"],
+    ];
+    for arguments in commands {
+        let full = File::create("/dev/full").expect("a device");
+        let said = directory.command(arguments).stdout(full).output().expect("the program starts");
+        let err = String::from_utf8_lossy(&said.stderr);
+        if err.contains("apt install python3-matplotlib") {
+            continue;
+        }
+        assert!(
+            said.status.code().is_some_and(|code| [1, 2].contains(&code)),
+            "{arguments:?}: {said:?}"
+        );
+        let sentence = "error: standard output: No space left on device";
+        assert!(err.contains(sentence), "{arguments:?}: {err}");
+        assert!(!err.contains("Traceback") && !err.contains("Exception"), "{arguments:?}: {err}");
+    }
+}
+
+/// Names, titles and units that are commands for a terminal, a browser or a typesetter are nothing but text everywhere.
+#[test]
+fn names_that_are_commands() {
+    let hostile = "a\u{1b}]0;owned\u{7}\u{9b}31m</script><script>alert(1)</script>$\\frac{$";
+    let directory = TestDirectory::new();
+    let quoted = toml::Value::from(hostile).to_string();
+    let mesh = square(4).replace("\"top\"", &format!("\"{hostile}\""));
+    directory.write("square.msh", &mesh);
+    let scene = SCENE
+        .replace("\"top\"", &quoted)
+        .replace("\"Pressed square\"", &quoted)
+        .replace("[mesh]", &format!("[units]\nlength = {quoted}\ntime = {quoted}\n[mesh]"));
+    directory.write("scene.toml", &scene);
+    let path = format!("{hostile}.toml").replace('/', "_");
+    directory.write(&path, &scene);
+    // The helper refuses escape codes in all that is said.
+    let said = directory.say(&["run", "scene.toml", "--set", "output.every=5"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(said.out.contains("\\x1b"), "{said:?}");
+    let out = format!("out/{}", path.trim_end_matches(".toml"));
+    let commands: [&[&str]; 13] = [
+        &["check", "scene.toml"],
+        &["check", &path],
+        &["run", &path],
+        &["check", "scene.toml", "--mesh", &path],
+        &["check", "scene.toml", hostile],
+        &["info", &out],
+        &["table", &out, "out/scene", "--columns", "work,\u{1b}[31m"],
+        &["table", &out, "out/scene", "--csv"],
+        &["figures", &out, "out/scene", "--evolution", "--mesh"],
+        &["figures", &out, "--along", hostile],
+        &["report", &out, "out/scene", "--pdf", "--author", hostile],
+        &["study", &path, "--set", "time.end=0.1"],
+        &["compare", &path, "--solvers", "tao"],
+    ];
+    for arguments in commands {
+        let said = directory.say(arguments);
+        let has_control =
+            |text: &str| text.chars().any(|c| c.is_control() && !"\r\n\t".contains(c));
+        assert!(!has_control(&said.out) && !has_control(&said.err), "{arguments:?}: {said:?}");
+        assert!(
+            !said.err.contains("Traceback") && !said.err.contains("not as `run`"),
+            "{arguments:?}: {said:?}"
+        );
+        let is_wrong = said.err.contains(": a mesh is") || said.err.contains("unexpected argument");
+        let lacks = said.err.contains("apt install") || said.err.contains("no summary has");
+        assert!(said.code == Some(0) || is_wrong || lacks, "{arguments:?}: {said:?}");
+    }
+    for folder in [&out, "out/scene"] {
+        let page = directory.read(&format!("{folder}/report.html"));
+        assert!(!page.contains("<script>alert"), "{folder}");
+        assert!(page.contains("&lt;script&gt;alert"), "{folder}: the name is there, as text");
+        assert_eq!(page.matches("</script>").count(), 1, "{folder}: the end of the slider");
+    }
+}
+
+/// A file of results with one thing changed: every command of Python works, or says a sentence that names the folder.
+#[test]
+fn results_that_were_edited_or_damaged() {
+    let made = TestDirectory::new();
+    made.run(&["--set", "output.every=5"]);
+    if made.say_python(&["info", "out/scene"]).is_none() {
+        return;
+    }
+    let summary = made.summary("out/scene");
+    let values = ["null", "true", "-3", "1e999", "\"text\"", "[]", "[[1]]", "{}", "[null, \"x\"]"];
+    let mut cases = Vec::new();
+    for key in summary.as_object().expect("an object").keys() {
+        // Each value of a table is enough for one of its kind.
+        let number = cases.len();
+        for value in values.iter().skip(number % 3).step_by(3) {
+            let mut other = summary.clone();
+            other[key] = serde_json::from_str(value).unwrap_or(serde_json::Value::Null);
+            cases.push(("summary.json", other.to_string()));
+        }
+        let mut without = summary.clone();
+        without.as_object_mut().expect("an object").remove(key);
+        cases.push(("summary.json", without.to_string()));
+    }
+    for (n, key) in
+        ["value", "bar", "at", "governing", "unit", "label", "singular"].iter().enumerate()
+    {
+        let mut other = summary.clone();
+        other["figures"]["work"][key] = serde_json::from_str(values[n]).unwrap_or_default();
+        cases.push(("summary.json", other.to_string()));
+    }
+    for text in [
+        "",
+        "{",
+        "[]",
+        "3",
+        "null",
+        "{\"steps\": 1}",
+        &"[".repeat(100_000),
+        "{\"steps\": NaN}",
+        "\u{0}",
+    ] {
+        cases.push(("summary.json", text.to_owned()));
+    }
+    let texts = [
+        "history.csv",
+        "contact.csv",
+        "fields.pvd",
+        "scene.toml",
+        "fields_0000.vtu",
+        "fields_0002.vtu",
+    ];
+    for name in texts.into_iter().filter(|name| made.path(&format!("out/scene/{name}")).exists()) {
+        let text = made.read(&format!("out/scene/{name}"));
+        let lines: Vec<&str> = text.lines().collect();
+        cases.push((name, String::new()));
+        cases.push((name, text[..text.len() / 2].to_owned()));
+        cases.push((name, lines[0].to_owned()));
+        cases.push((name, text.replace("0.", "x.")));
+        cases.push((name, text.replace("work", "other").replace("zeta", "other")));
+        cases.push((name, text.replace("\"3\"", "\"2\"").replace("Float64", "Int8")));
+        cases.push((name, format!("{text}{}", lines[lines.len() - 1])));
+        cases.push((name, "\u{0}\u{1}\u{2}".to_owned()));
+    }
+    let mut folders = Vec::new();
+    for (number, (name, text)) in cases.iter().enumerate() {
+        let folder = format!("out/case{number}");
+        for file in made.names("out/scene") {
+            made.write(&format!("{folder}/{file}"), "");
+            let [from, to] = ["out/scene", &folder].map(|of| made.path(&format!("{of}/{file}")));
+            fs::copy(from, to).expect("written");
+        }
+        made.write(&format!("{folder}/{name}"), text);
+        folders.push(folder);
+    }
+    let all: Vec<&str> = folders.iter().map(String::as_str).collect();
+    let columns = ["--columns", "work,work.governing,errors.solver,steps"];
+    let drawn = ["--only", "pressure,force-displacement", "--format", "svg"];
+    let mut commands =
+        vec![[&["table"][..], &all, &columns].concat(), [&["figures"][..], &all, &drawn].concat()];
+    // These are slower: a folder of each kind.
+    commands.extend(all.iter().skip(1).step_by(7).map(|folder| vec!["info", *folder]));
+    commands.push([vec!["report"], all.iter().skip(3).step_by(9).copied().collect()].concat());
+    commands
+        .extend(all.iter().skip(2).step_by(11).map(|f| vec!["figures", *f, "--along", "bottom"]));
+    for arguments in commands {
+        let said = made.say(&arguments);
+        let asked = &arguments[..2];
+        assert!(
+            !said.err.contains("Traceback") && !said.err.contains("Warning"),
+            "{asked:?}: {said:?}"
+        );
+        assert!([Some(0), Some(2)].contains(&said.code), "{asked:?}: {said:?}");
+        assert_eq!(said.code == Some(0), said.err.is_empty(), "{asked:?}: {said:?}");
+        for line in said.err.lines() {
+            let named = line.contains("out/case") || line.contains("no summary has");
+            assert!(line.starts_with("error: ") && named, "{asked:?}: {line}");
+        }
+        // The undamaged files beside them are read.
+        if arguments.len() > 20 {
+            assert!(said.err.lines().count() > 20 && !said.out.is_empty(), "{asked:?}: {said:?}");
+        }
+    }
+}
+
+/// Arguments that are no names, numbers or files.
+#[test]
+fn arguments_of_the_scripts() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    let (long, line) = ("x".repeat(200_000), "a\nb");
+    directory.write("long.csv", &format!("label,time.end\n{},1\n", "ä".repeat(200)));
+    directory.write("cell.csv", &format!("time.end\n{}\n", "9".repeat(150_000)));
+    directory.write("quote.csv", "time.end\n\"1\n");
+    directory.write("empty.csv", "");
+    let text = format!("{SCENE}# \"{}.csv\"\n", "y".repeat(400));
+    directory.write("long.toml", &text);
+    directory.write("latin.toml", SCENE);
+    fs::write(directory.path("latin.toml"), [SCENE.as_bytes(), b"# \xe4\n"].concat())
+        .expect("mine");
+    let cases: [&[&str]; 12] = [
+        &["table", "out/scene", "--columns", &long[..100_000]],
+        &["table", "out/scene", "--columns", line],
+        &["table", "out/scene", "--columns", "\"work"],
+        &["table", &long[..300]],
+        &["info", &long[..300]],
+        &["figures", &long[..300]],
+        &["figures", "out/scene", "--along", &long[..300]],
+        &["study", "scene.toml", "--cases", "long.csv"],
+        &["study", "scene.toml", "--cases", "cell.csv"],
+        &["study", "scene.toml", "--cases", "quote.csv"],
+        &["study", "long.toml", "--set", "time.end=0.1"],
+        &["study", "latin.toml", "--set", "time.end=0.1"],
+    ];
+    for arguments in cases.iter().chain(&[&["study", "scene.toml", "--cases", "empty.csv"][..]]) {
+        let said = directory.say(arguments);
+        let shown: Vec<&str> = arguments.iter().map(|word| &word[..word.len().min(30)]).collect();
+        let err: String = said.err.chars().take(500).collect();
+        assert!(!err.contains("Traceback") && !err.contains("not as `run`"), "{shown:?}: {err}");
+        assert!([Some(0), Some(1), Some(2)].contains(&said.code), "{shown:?}: {err}");
+        assert!(said.code == Some(0) || err.contains("error: "), "{shown:?}: {err}");
+    }
+}
+
+/// Ctrl-C at any moment of a command of Python ends it without a traceback.
+#[test]
+fn a_signal_while_python_starts() {
+    let directory = TestDirectory::new();
+    directory.run(&["--set", "output.every=5"]);
+    if directory.say_python(&["info", "out/scene"]).is_none() {
+        return;
+    }
+    for (command, pause) in
+        ["info", "report"].iter().flat_map(|c| (0..20).map(move |k| (c, 25 * k)))
+    {
+        let mut command = directory.command(&[command, "out/scene"]);
+        let child =
+            command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
+        sleep(Duration::from_millis(pause));
+        signal(child.id(), "INT");
+        let ended = child.wait_with_output().expect("it ends");
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert!(err.is_empty(), "after {pause} ms: {err}");
+    }
+}
+
+/// Processes that draw end with the one that has started them, however that ends.
+#[test]
+fn a_report_that_is_killed_leaves_no_processes() {
+    let directory = TestDirectory::new();
+    directory.run(&["--set", "output.every=1"]);
+    if directory.say_python(&["info", "out/scene"]).is_none() {
+        return;
+    }
+    // Forked processes have the same arguments.
+    let folder = directory.path("out/scene").display().to_string();
+    let alive = || {
+        let processes = fs::read_dir("/proc").expect("Linux").flatten();
+        let lines = processes.filter_map(|of| fs::read(of.path().join("cmdline")).ok());
+        lines.filter(|line| String::from_utf8_lossy(line).contains(&folder)).count()
+    };
+    for name in ["KILL", "TERM"] {
+        let mut command = directory.command(&["report", &folder]);
+        let mut child =
+            command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
+        wait_until("processes that draw", || alive() > 1);
+        signal(child.id(), name);
+        child.wait().expect("it ends");
+        wait_until("the end of all processes", || alive() == 0);
+    }
+}
+
+/// The module says which package it lacks.
+#[test]
+fn a_table_without_pandas() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    let program = "import sys; sys.modules['pandas'] = sys.modules['scipy.io'] = None\n\
+                   from signorini_results import load, table\n\
+                   for call in (lambda: table(['out/scene']), lambda: load('out/scene').matrices()):\n\
+                   \x20   try: call()\n    except ImportError as error: print(error)";
+    let mut command = std::process::Command::new("/usr/bin/python3");
+    command.args(["-c", program]).current_dir(directory.path("."));
+    let output = command.env("PYTHONPATH", format!("{ROOT}/scripts")).output().expect("Python");
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    if String::from_utf8_lossy(&output.stderr).contains("No module named") {
+        return;
+    }
+    assert!(said.contains("needs pandas") && said.contains("needs scipy"), "{output:?}");
+}
