@@ -75,7 +75,7 @@ pub fn load_graded(
         "};\nsizes = newf;\nField[sizes] = PostView;\nField[sizes].ViewIndex = PostProcessing.NbViews - 1;\n\
          Background Field = sizes;\n",
     );
-    let bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
+    let bytes = run(geo, arguments(parameters), &last)?;
     parse_made(&bytes, geo).map(Mesh::in_morton_order)
 }
 
@@ -132,7 +132,7 @@ fn kept(
         return parse(file, &path);
     }
     let bytes = match format {
-        Format::Geometry => run((geo, None), arguments, &last, "mesh it")?,
+        Format::Geometry => run(geo, arguments, &last)?,
         _ => convert::run(geo)?,
     };
     let mesh = parse_made(&bytes, geo)?;
