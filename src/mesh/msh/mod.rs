@@ -51,8 +51,15 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
     let mesh = Section::split(bytes, &mut sections)
         .and_then(|()| contents(&sections, false))
         .and_then(|contents| body::mesh(&contents));
-    let gmsh = sections.iter().filter(|section| section.name == "Comments").find_map(version);
-    mesh.map(|mesh| Mesh { gmsh, ..mesh }).map_err(|(at, problem)| {
+    let comment = |start| {
+        let comments = sections.iter().filter(|section| section.name == "Comments");
+        comments.filter_map(move |section| comment(section, start))
+    };
+    let finished = mesh.map(|mut mesh| {
+        mesh.notes.extend(comment("note "));
+        Mesh { gmsh: comment("gmsh ").next(), ..mesh }
+    });
+    finished.map_err(|(at, problem)| {
         let place = at.map_or_else(String::new, |at| place(at, bytes, &sections));
         MeshError::File { path: path.to_owned(), place, problem }
     })
@@ -72,10 +79,10 @@ pub(super) fn is_complete(bytes: &[u8]) -> bool {
     sections_of(bytes).is_ok_and(|sections| !sections.is_empty())
 }
 
-/// The version of gmsh in a comment `gmsh 4.8.4`.
-fn version(comment: &Section) -> Option<String> {
-    let line = ByteReader::new(comment, false).line("a comment").ok()?;
-    line.strip_prefix("gmsh ").map(str::to_owned)
+/// What follows this start of a comment, such as the version of gmsh in `gmsh 4.8.4`.
+fn comment(section: &Section, start: &str) -> Option<String> {
+    let line = ByteReader::new(section, false).line("a comment").ok()?;
+    line.strip_prefix(start).map(str::to_owned)
 }
 
 fn sections_of(bytes: &[u8]) -> Result<Vec<Section<'_>>> {
