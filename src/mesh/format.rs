@@ -9,7 +9,7 @@ pub enum Format {
     Msh,
     /// A geometry, which gmsh meshes.
     Geometry,
-    /// A mesh of another program, which scripts/convert.py converts.
+    /// A mesh of another program, which scripts/meshes/ converts.
     Foreign,
 }
 

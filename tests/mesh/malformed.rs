@@ -45,7 +45,10 @@ fn versions_and_byte_orders() {
     complains(format("abc 0 8"), &["x.msh:2: expected a version such as 4.1, found `abc`"]);
     complains(format("4.1"), &["expected version, file type and data size"]);
     complains(format("4.1 7 8"), &["file type 0 (text) or 1 (binary), found `7`"]);
-    complains(format("9.9 0 8"), &["x.msh:2: version 9.9 is not read; write the mesh as version 4.1"]);
+    complains(
+        format("9.9 0 8"),
+        &["x.msh:2: version 9.9 is not read; write the mesh as version 4.1"],
+    );
     complains(format("2.2 0 8"), &["x.msh: there is no $Nodes section"]);
 
     let mut bytes = fs::read(fixture("plate-41-binary")).unwrap();
@@ -225,7 +228,8 @@ fn places_stand_apart_from_problems() {
 /// Per version: the lines of the counts of its text, from which a file may lack elements or have too many.
 #[test]
 fn a_count_that_the_file_does_not_keep_is_refused_in_every_version() {
-    for name in ["version-1", "plate-22", "parametric-22", "save-all-22", "version-40", "plate-41"] {
+    for name in ["version-1", "plate-22", "parametric-22", "save-all-22", "version-40", "plate-41"]
+    {
         let text = fs::read_to_string(fixture(name)).unwrap();
         assert!(read_bytes(&text).is_ok(), "{name}");
         let lines: Vec<&str> = text.lines().collect();
@@ -241,7 +245,10 @@ fn a_count_that_the_file_does_not_keep_is_refused_in_every_version() {
                 other[place] = &changed;
                 let other = [&lines[..=at], &[&*other.join(" ")], &lines[at + 2..]].concat();
                 let message = read_bytes(other.join("\n")).unwrap_err().to_string();
-                assert!(message.contains("x.msh:") && message.contains("expected"), "{name}: {message}");
+                assert!(
+                    message.contains("x.msh:") && message.contains("expected"),
+                    "{name}: {message}"
+                );
             }
             // A line that is lost or listed again.
             for line in [at + 6, at + 9] {

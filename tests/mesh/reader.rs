@@ -155,7 +155,14 @@ fn quadrilaterals_are_two_triangles() {
     }
     // A square in second order whose right side is an arc, from either diagonal and direction, listed for two groups.
     let nodes = [
-        "1 0 0 0", "2 1 0 0", "3 1 1 0", "4 0 1 0", "5 0.5 0 0", "6 1.2 0.5 0", "7 0.5 1 0", "8 0 0.5 0",
+        "1 0 0 0",
+        "2 1 0 0",
+        "3 1 1 0",
+        "4 0 1 0",
+        "5 0.5 0 0",
+        "6 1.2 0.5 0",
+        "7 0.5 1 0",
+        "8 0 0.5 0",
         "9 0.55 0.5 0",
     ];
     let area = 1.0 + 2.0 / 3.0 * 0.2;
@@ -174,7 +181,9 @@ fn quadrilaterals_are_two_triangles() {
         }
     }
     // A corner listed twice makes a triangle, in both orders.
-    for twice in ["1 3 1 1 2 3 3", "1 3 1 3 3 1 2", "1 16 1 1 2 3 3 5 6 3 9", "1 10 1 3 1 2 3 9 5 6 3 9"] {
+    for twice in
+        ["1 3 1 1 2 3 3", "1 3 1 3 3 1 2", "1 16 1 1 2 3 3 5 6 3 9", "1 10 1 3 1 2 3 9 5 6 3 9"]
+    {
         let mesh = read_bytes(msh(&[], &nodes, &[twice])).unwrap();
         assert_eq!(mesh.triangles.len(), 1, "{twice}");
     }
@@ -184,7 +193,8 @@ fn quadrilaterals_are_two_triangles() {
 fn the_order_of_bytes_does_not_matter() {
     // `plate-22-binary`: integers of four bytes, and tags with three reals.
     let bytes = fs::read(fixture("plate-22-binary")).unwrap();
-    let after = |text: &[u8]| bytes.windows(text.len()).position(|w| w == text).unwrap() + text.len();
+    let after =
+        |text: &[u8]| bytes.windows(text.len()).position(|w| w == text).unwrap() + text.len();
     let mut swapped = bytes.clone();
     let mut swap = |at: usize, width: usize| swapped[at..at + width].reverse();
     swap(after(b"2.2 1 8\n"), 4);

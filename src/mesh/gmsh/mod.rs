@@ -117,7 +117,7 @@ fn kept(
     let arguments = arguments(parameters);
     let last = match format {
         Format::Geometry => last_words(&text, parameters, order),
-        _ => convert::SCRIPT.to_owned(),
+        _ => convert::sources(),
     };
     let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
     let digest = inputs.digest(&arguments, &last);

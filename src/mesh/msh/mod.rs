@@ -40,8 +40,15 @@ pub fn parse(bytes: &[u8], path: &Path) -> std::result::Result<Mesh, MeshError> 
     let mesh = Section::split(bytes, &mut sections)
         .and_then(|()| contents(&sections))
         .and_then(body::mesh);
-    let gmsh = sections.iter().filter(|section| section.name == "Comments").find_map(version);
-    mesh.map(|mesh| Mesh { gmsh, ..mesh }).map_err(|(at, problem)| {
+    let comment = |start| {
+        let comments = sections.iter().filter(|section| section.name == "Comments");
+        comments.filter_map(move |section| comment(section, start))
+    };
+    let finished = mesh.map(|mut mesh| {
+        mesh.notes.extend(comment("note "));
+        Mesh { gmsh: comment("gmsh ").next(), ..mesh }
+    });
+    finished.map_err(|(at, problem)| {
         let place = at.map_or_else(String::new, |at| place(at, bytes, &sections));
         MeshError::File { path: path.to_owned(), place, problem }
     })
@@ -62,10 +69,10 @@ pub(super) fn is_complete(bytes: &[u8]) -> bool {
     Section::split(bytes, &mut sections).is_ok() && !sections.is_empty()
 }
 
-/// The version of gmsh in a comment `gmsh 4.8.4`.
-fn version(comment: &Section) -> Option<String> {
-    let line = ByteReader::new(comment, Encoding::default()).line("a comment").ok()?;
-    line.strip_prefix("gmsh ").map(str::to_owned)
+/// What follows this start of a comment, such as the version of gmsh in `gmsh 4.8.4`.
+fn comment(section: &Section, start: &str) -> Option<String> {
+    let line = ByteReader::new(section, Encoding::default()).line("a comment").ok()?;
+    line.strip_prefix(start).map(str::to_owned)
 }
 
 /// The place of a byte in a message: the line in a text file, the byte in a binary file.
