@@ -39,6 +39,7 @@ class Mesh:
 
     def __init__(self):
         self.nodes, self.elements, self.notes, self.hidden = {}, {}, [], set()
+        self.materials = None  # The array of the numbers of materials that the user chose.
         self.node_sets, self.element_sets, self.side_sets = (defaultdict(list) for _ in range(3))
 
     def add_node(self, label, at, place=""):

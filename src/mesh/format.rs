@@ -28,3 +28,9 @@ impl Format {
         }
     }
 }
+
+/// Whether the format of a file has arrays on its cells, of which one may have the numbers of the materials.
+pub fn has_arrays(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    ["vtu", "vtk", "xdmf"].iter().any(|with_arrays| ending == *with_arrays)
+}
