@@ -15,16 +15,20 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Sources(MetaPathFinder, InspectLoader):
-    """Imports modules from their sources."""
+    """Imports modules from their sources. A folder is a package."""
 
     def __init__(self, sources):
         self.sources = sources
 
     def find_spec(self, name, path, target=None):
-        return spec_from_loader(name, self) if name in self.sources else None
+        is_known = name.replace(".", "/") in self.sources or self.is_package(name)
+        return spec_from_loader(name, self) if is_known else None
+
+    def is_package(self, name):
+        return any(source.startswith(name + "/") for source in self.sources)
 
     def get_source(self, name):
-        return self.sources[name]
+        return "" if self.is_package(name) else self.sources[name.replace(".", "/")]
 
     def get_data(self, path):
         return self.sources[path].encode()

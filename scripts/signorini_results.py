@@ -131,7 +131,7 @@ def _toml(value):
         return "{" + ", ".join(f"{json.dumps(key)} = {_toml(of)}" for key, of in value.items() if of is not None) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False, default=lambda array: array.tolist())
+    return json.dumps(value, ensure_ascii=False, default=lambda of: str(of) if isinstance(of, Path) else of.tolist())
 
 
 def _keys(overrides, prefix=""):

@@ -1,10 +1,35 @@
 //! The Python of the scripts in scripts/.
 
-use std::{env, ffi::OsString, process::Command};
+use std::{
+    collections::BTreeMap,
+    env,
+    ffi::{OsStr, OsString},
+    io::{self, Seek},
+    process::Command,
+};
+
+/// Names and sources of files in scripts/.
+macro_rules! scripts {
+    ($($name:literal)*) => {
+        [$(($name, include_str!(concat!("../scripts/", $name, ".py")))),*]
+    };
+}
+
+/// The scripts and the modules that they import from each other.
+pub(crate) const SCRIPTS: [(&str, &str); 33] = scripts! {
+    "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
+    "histories" "info" "limits" "lines" "maps" "meshes/abaqus" "meshes/by_meshio" "meshes/convert"
+    "meshes/description" "meshes/msh" "meshes/nastran" "meshes/universal" "paraview_script" "paraview_view" "principal"
+    "reading" "report" "report_pdf" "results" "setting" "signorini_files" "signorini_results" "signorini_summaries" "study" "table"
+};
+/// The template of the report, for `report`.
+const REPORT: (&str, &str) = ("report.html", include_str!("../scripts/report.html"));
+/// The Python program that runs one of them.
+const EMBEDDED: &str = include_str!("../scripts/embedded.py");
 
 /// The first arguments of every Python: it finds modules neither in the current folder nor by `PYTHONPATH` nor among the
 /// packages of the user (`-I`), and its texts are in UTF-8, except paths, which may be any bytes.
-pub const ISOLATED: [&str; 3] = ["-I", "-X", "utf8"];
+const ISOLATED: [&str; 3] = ["-I", "-X", "utf8"];
 
 /// The Python program that prints which of the modules in its arguments are missing.
 const PROBE: &str = "import sys, importlib.util as util\n\
@@ -36,4 +61,21 @@ pub fn python(modules: &[&str]) -> Result<OsString, String> {
         named.join(" python3-"),
         problems.join("; ")
     ))
+}
+
+/// The command that runs the script `name` with this Python; arguments may follow. The script gets the sources of all modules
+/// on standard input.
+///
+/// # Errors
+/// There is no room for temporary files.
+pub fn script_command(python: &OsStr, name: &str) -> io::Result<Command> {
+    let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
+    let mut sources = tempfile::tempfile()?;
+    serde_json::to_writer(&sources, &all)?;
+    sources.rewind()?;
+    // Python would answer Ctrl-C with a traceback until the script handles it: so Ctrl-C has no effect before.
+    let mut command = Command::new("sh");
+    command.args(["-c", "trap '' INT; exec \"$@\"", "sh"]).arg(python).args(ISOLATED);
+    command.args(["-c", EMBEDDED, name]).stdin(sources);
+    Ok(command)
 }

@@ -44,7 +44,7 @@ pub fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, MeshError> {
     const THINNER: f64 = 0.25;
     /// Meshes that are graded towards angles, as the third power holds for small ones, corners stay, and gmsh may fail.
     const GRADINGS: usize = 8;
-    let MeshSource { file, parameters } = &scene.mesh;
+    let MeshSource { file, parameters, .. } = &scene.mesh;
     let usual = mesh::load(file, parameters, Order::Linear)?;
     let scaling = mesh::scaling_factor(file)?;
     let mut parameters = parameters.clone();

@@ -197,11 +197,11 @@ impl SceneArguments {
 /// The mesh of a scene; gmsh makes it if necessary. If the run will adapt the mesh to an accuracy, the mesh of
 /// a `.geo` is coarse.
 fn read_mesh(scene: &Scene, adapts: bool) -> Result<Mesh, Failure> {
-    let MeshSource { file, parameters } = &scene.mesh;
+    let MeshSource { file, parameters, materials } = &scene.mesh;
     let is_adapted = adapts && Format::of(file) == Some(Format::Geometry);
     let mesh = match scene.accuracy.filter(|_| is_adapted) {
         Some(accuracy) => accuracy::first_mesh(scene, accuracy),
-        None => mesh::load(file, parameters, scene.order),
+        None => mesh::load_choosing(file, parameters, materials.as_deref(), scene.order),
     };
     let mut mesh = mesh.map_err(Failure::input)?;
     scene.name_edges(&mut mesh).map_err(Failure::input)?;

@@ -2,29 +2,9 @@
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
-use signorini::python::{ISOLATED, python};
-use std::{
-    collections::BTreeMap, env, ffi::OsString, io::Seek, os::unix::process::CommandExt,
-    process::Command,
-};
+use signorini::python::{python, script_command};
+use std::{env, ffi::OsString, os::unix::process::CommandExt};
 
-/// Names and sources of files in scripts/.
-macro_rules! scripts {
-    ($($name:literal)*) => {
-        [$(($name, include_str!(concat!("../../scripts/", $name, ".py")))),*]
-    };
-}
-
-/// The scripts and the modules that they import from each other.
-const SCRIPTS: [(&str, &str); 26] = scripts! {
-    "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
-    "histories" "info" "limits" "lines" "maps" "paraview_script" "paraview_view" "principal" "reading" "report"
-    "report_pdf" "results" "setting" "signorini_files" "signorini_results" "signorini_summaries" "study" "table"
-};
-/// The template of the report, for `report`.
-const REPORT: (&str, &str) = ("report.html", include_str!("../../scripts/report.html"));
-/// The Python program that runs one of them.
-const EMBEDDED: &str = include_str!("../../scripts/embedded.py");
 /// Arguments of a script.
 #[derive(Args)]
 #[command(disable_help_flag = true)]
@@ -38,27 +18,15 @@ pub struct ScriptArguments {
 pub fn script(name: &str, ScriptArguments { arguments }: &ScriptArguments) -> Result<(), Failure> {
     require_one_process()?;
     let python = python(&["matplotlib", "meshio", "tomllib"]).map_err(Failure::input)?;
-    let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
-    let sources = (|| {
-        let mut file = tempfile::tempfile()?;
-        serde_json::to_writer(&file, &all)?;
-        file.rewind().map(|()| file)
-    })();
-    let sources = sources.map_err(|error| {
+    let mut command = script_command(&python, name).map_err(|error| {
         let folder = env::temp_dir();
         format!("{}: {error}; set TMPDIR to another folder for temporary files", folder.display())
     })?;
-    // Python takes the place of this process, and gets its signals. It would answer Ctrl-C with a traceback until the script
-    // handles it: so Ctrl-C has no effect before.
-    let error = Command::new("sh")
-        .args(["-c", "trap '' INT; exec \"$@\"", "sh"])
-        .arg(&python)
-        .args(ISOLATED)
-        .args(["-c", EMBEDDED, name])
+    // Python takes the place of this process, and gets its signals.
+    let error = command
         .args(arguments)
         // `compare` runs this program.
         .env("SIGNORINI", env::current_exe().map_err(Failure::from)?)
-        .stdin(sources)
         .exec();
     Err(Failure::from(format!("{}: {error}", python.display())))
 }

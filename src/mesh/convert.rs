@@ -1,27 +1,29 @@
 //! Converts meshes of other programs to MSH 4.1 with Python.
 
-use super::{MeshError, gmsh::note};
-use crate::python::{ISOLATED, python};
-use std::{path::Path, process::Command};
+use super::MeshError;
+use crate::python::{SCRIPTS, python, script_command};
+use std::path::Path;
 
-/// The Python program that writes a mesh as MSH 4.1.
-pub const SCRIPT: &str = include_str!("../../scripts/convert.py");
+/// The sources of the converter.
+pub fn sources() -> String {
+    SCRIPTS.iter().filter(|(name, _)| name.starts_with("meshes/")).map(|(_, text)| *text).collect()
+}
 
-/// The bytes of the MSH 4.1 file that the script makes from the file `path`. Some formats need no meshio.
+/// The bytes of the MSH 4.1 file that the script makes from the file `path`, with the array that has its `materials`. Some
+/// formats need no meshio.
 ///
 /// # Errors
 /// Python or meshio is missing, or the file is no plane mesh in the format that its extension names.
-pub fn run(path: &Path) -> Result<Vec<u8>, MeshError> {
+pub fn run(path: &Path, materials: Option<&str>) -> Result<Vec<u8>, MeshError> {
     let python = python(&["meshio"]).or_else(|problem| python(&[]).map_err(|_| problem));
     let python = python.map_err(|problem| MeshError::file(path, problem))?;
-    let mut command = Command::new(&python);
-    command.args(ISOLATED).args(["-c", SCRIPT]).arg(path);
-    let made = command.output().map_err(MeshError::io(Path::new(&python)))?;
+    let made = script_command(&python, "meshes.convert")
+        .and_then(|mut command| command.arg(path).args(materials).output());
+    let made = made.map_err(MeshError::io(Path::new(&python)))?;
     let said = String::from_utf8_lossy(&made.stderr);
     let last = said.trim().lines().last().unwrap_or("the conversion failed");
     if !made.status.success() {
         return Err(MeshError::file(path, last));
     }
-    said.lines().filter_map(|line| line.strip_prefix("note: ")).for_each(|text| note(path, text));
     Ok(made.stdout)
 }

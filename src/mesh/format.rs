@@ -9,7 +9,7 @@ pub enum Format {
     Msh,
     /// A geometry, which gmsh meshes.
     Geometry,
-    /// A mesh of another program, which scripts/convert.py converts.
+    /// A mesh of another program, which scripts/meshes/ converts.
     Foreign,
 }
 
@@ -27,4 +27,10 @@ impl Format {
             _ => None,
         }
     }
+}
+
+/// Whether the format of a file has arrays on its cells, of which one may have the numbers of the materials.
+pub fn has_arrays(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    ["vtu", "vtk", "xdmf"].iter().any(|with_arrays| ending == *with_arrays)
 }

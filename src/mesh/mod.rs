@@ -25,8 +25,8 @@ mod refine;
 
 pub use boundary::{BoundaryFace, SAME_DIRECTION, joined_faces};
 pub use error::MeshError;
-pub use format::{FORMATS, Format};
-pub use gmsh::{copies, load, load_graded, renamed, scaling_factor};
+pub use format::{FORMATS, Format, has_arrays};
+pub use gmsh::{copies, load, load_choosing, load_graded, renamed, scaling_factor};
 pub(crate) use lines::CHORDS;
 pub use lines::Lines;
 pub use msh::{parse, read};

@@ -127,19 +127,22 @@ impl Mesh {
         [[a, b], [b, c], [c, a]].map(|[p, q]| offset(nodes[p], nodes[q], self.midpoint([p, q])))
     }
 
-    /// Whether det ∂x/∂(λ₂, λ₃) of a triangle is above `bound` (m²) at its vertices, at the midpoints of its
-    /// sides and at the points of the three-point quadrature rule inside it.
+    /// Whether a triangle [`is_unfolded`].
     pub(super) fn jacobian_exceeds(&self, bound: f64, triangle: [usize; 3]) -> bool {
         let [a, b, c] = triangle;
         let sides = [[a, b], [b, c], [c, a]].map(|side| self.midpoint(side));
         let [p, q, r] = triangle.map(|node| self.nodes[node]);
-        let nodes = [p, q, r, sides[0], sides[1], sides[2]];
-        let points = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0]];
-        let mut rotated =
-            points.into_iter().flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
-        // This is false for NaN, too.
-        rotated.all(|lambda| quadratic_measure(&nodes, lambda) > bound)
+        is_unfolded(&[p, q, r, sides[0], sides[1], sides[2]], bound)
     }
+}
+
+/// Whether det ∂x/∂(λ₂, λ₃) of a triangle of six nodes is above `bound` (m²) at its vertices, at the midpoints of its
+/// sides and at the points of the three-point quadrature rule inside it.
+pub(super) fn is_unfolded(nodes: &[[f64; 2]; 6], bound: f64) -> bool {
+    let points = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0]];
+    let mut rotated = points.into_iter().flat_map(|[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]]);
+    // This is false for NaN, too.
+    rotated.all(|lambda| quadratic_measure(nodes, lambda) > bound)
 }
 
 /// The derivatives of the six P2 functions by λ_1 and λ_2 (λ_0 = 1 − λ_1 − λ_2).

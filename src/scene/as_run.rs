@@ -60,9 +60,10 @@ impl Scene {
         let full = || absolute(source).to_string_lossy().into_owned();
         let file = of_mesh.first().map_or_else(full, |(name, _)| name.clone());
         copies.extend(of_mesh);
-        // A mesh from the command line has no parameters.
+        // A mesh from the command line has no other keys.
         let written = scene.get("mesh").and_then(toml::Value::as_table).cloned();
-        let mut mesh = written.filter(|_| !self.mesh.parameters.is_empty()).unwrap_or_default();
+        let has_keys = !self.mesh.parameters.is_empty() || self.mesh.materials.is_some();
+        let mut mesh = written.filter(|_| has_keys).unwrap_or_default();
         mesh.insert("file".into(), file.into());
         scene.insert("mesh".into(), mesh.into());
         AsRun { text: format!("{FIRST_LINE}\n{scene}"), copies, tables }

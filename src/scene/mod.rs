@@ -96,12 +96,14 @@ pub struct MeshSource {
     pub file: PathBuf,
     /// Constants set in the geometry, by name; `size` is the mesh size, m.
     pub parameters: BTreeMap<String, f64>,
+    /// The array on the cells of a mesh in VTK or XDMF that has the numbers of the materials.
+    pub materials: Option<String>,
 }
 
 impl MeshSource {
     /// The mesh in `file`, with no parameters (`--mesh FILE`).
     pub fn from_path(file: impl Into<PathBuf>) -> Self {
-        Self { file: file.into(), parameters: BTreeMap::new() }
+        Self { file: file.into(), parameters: BTreeMap::new(), materials: None }
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     contact::{self, ContactOptions},
     fem::Mass,
-    mesh::{FORMATS, Format, Order},
+    mesh::{FORMATS, Format, Order, has_arrays},
     model::{DamageLaw, Material},
 };
 use serde::{Deserialize, de::DeserializeOwned};
@@ -132,10 +132,11 @@ struct MeshKeys {
     file: String,
     size: Option<f64>,
     parameters: Option<BTreeMap<String, f64>>,
+    materials: Option<String>,
 }
 
 fn mesh(
-    MeshKeys { file, size, parameters }: MeshKeys,
+    MeshKeys { file, size, parameters, materials }: MeshKeys,
     folder: &Path,
 ) -> Result<MeshSource, Diagnostic> {
     let Some(format) = Format::of(Path::new(&file)) else {
@@ -148,13 +149,17 @@ fn mesh(
             format!("has no effect: \"{file}\" is used as it is; name its geometry"),
         ));
     }
+    if materials.is_some() && !has_arrays(Path::new(&file)) {
+        let problem = format!("has no effect: \"{file}\" is no .vtu, .vtk or .xdmf with arrays");
+        return Err(("materials", problem));
+    }
     let mut parameters = parameters.unwrap_or_default();
     if let Some(size) = size
         && parameters.insert("size".into(), size).is_some()
     {
         return Err(("size", "is given a second time in mesh.parameters; keep one".to_owned()));
     }
-    Ok(MeshSource { file: folder.join(file), parameters })
+    Ok(MeshSource { file: folder.join(file), parameters, materials })
 }
 
 fn contact(options: ContactOptions) -> Result<ContactOptions, Diagnostic> {

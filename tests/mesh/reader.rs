@@ -1,6 +1,6 @@
 //! What every mesh file must give, whatever its version, its form and its writer.
 
-use crate::common::{check_laws, close, curve_length, fixture, msh::msh, read_bytes};
+use crate::common::{check_laws, close, curve_length, curved_area, fixture, msh::msh, read_bytes};
 use signorini::mesh::{Curve, Mesh, read};
 use std::fs;
 
@@ -142,6 +142,72 @@ fn second_order_keeps_the_midpoints_of_curved_edges_only() {
         assert_eq!(disc.curved.len(), other.curved.len());
         assert_eq!(disc.triangles, other.triangles);
     }
+}
+
+/// The square of two quadrilaterals and the triangles of a corner, and how MSH 4.1 lists it.
+#[test]
+fn quadrilaterals_are_two_triangles() {
+    let mesh = read(&fixture("quadrangles")).unwrap();
+    check_laws(&mesh, 1.75, 8.0, 1);
+    assert!(mesh.notes[0].contains("quadrilaterals are cut into two triangles each"), "{mesh:?}");
+    for (name, length) in [("bottom", 2.0), ("outer sides", 6.0), ("hole", 2.0)] {
+        close(curve_length(&mesh, name), length);
+    }
+    // A square in second order whose right side is an arc, from either diagonal and direction, listed for two groups.
+    let nodes = [
+        "1 0 0 0",
+        "2 1 0 0",
+        "3 1 1 0",
+        "4 0 1 0",
+        "5 0.5 0 0",
+        "6 1.2 0.5 0",
+        "7 0.5 1 0",
+        "8 0 0.5 0",
+        "9 0.55 0.5 0",
+    ];
+    let area = 1.0 + 2.0 / 3.0 * 0.2;
+    for (kind, last) in [(16, ""), (10, " 9")] {
+        for turned in ["1 2 3 4 5 6 7 8", "2 3 4 1 6 7 8 5", "4 3 2 1 7 6 5 8"] {
+            let elements =
+                [format!("1 {kind} 1 {turned}{last}"), format!("2 {kind} 2 {turned}{last}")];
+            let elements: Vec<&str> = elements.iter().map(|element| &**element).collect();
+            let mesh = read_bytes(msh(&["2 1 \"a\"", "2 2 \"b\""], &nodes, &elements)).unwrap();
+            assert_eq!((mesh.triangles.len(), mesh.surfaces["a"].len()), (2, 2));
+            close(curved_area(&mesh), area);
+            // The diagonal goes through the centre, which the nodes of the sides place at (0.6, 0.5).
+            let [x, y] = mesh.curved.iter().find(|(_, at)| at[1] == 0.5 && at[0] < 1.0).unwrap().1;
+            close(*x, if kind == 16 { 0.6 } else { 0.55 });
+            close(*y, 0.5);
+        }
+    }
+    // A corner listed twice makes a triangle, in both orders.
+    for twice in
+        ["1 3 1 1 2 3 3", "1 3 1 3 3 1 2", "1 16 1 1 2 3 3 5 6 3 9", "1 10 1 3 1 2 3 9 5 6 3 9"]
+    {
+        let mesh = read_bytes(msh(&[], &nodes, &[twice])).unwrap();
+        assert_eq!(mesh.triangles.len(), 1, "{twice}");
+    }
+}
+
+#[test]
+fn the_order_of_bytes_does_not_matter() {
+    // `plate-22-binary`: integers of four bytes, and tags with three reals.
+    let bytes = fs::read(fixture("plate-22-binary")).unwrap();
+    let after =
+        |text: &[u8]| bytes.windows(text.len()).position(|w| w == text).unwrap() + text.len();
+    let mut swapped = bytes.clone();
+    let mut swap = |at: usize, width: usize| swapped[at..at + width].reverse();
+    swap(after(b"2.2 1 8\n"), 4);
+    let nodes = after(b"$Nodes\n21\n");
+    for node in 0..21 {
+        swap(nodes + 28 * node, 4);
+        (0..3).for_each(|k| swap(nodes + 28 * node + 4 + 8 * k, 8));
+    }
+    let elements = after(b"$Elements\n");
+    let start = elements + bytes[elements..].iter().position(|&b| b == b'\n').unwrap() + 1;
+    let end = after(b"$EndElements") - "\n$EndElements".len();
+    (start..end).step_by(4).for_each(|at| swap(at, 4));
+    assert!(read_bytes(swapped).unwrap() == read_bytes(bytes).unwrap());
 }
 
 /// Two triangles on a square, one of them clockwise; stray tags and an unused node. The second triangle is in

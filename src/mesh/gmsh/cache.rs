@@ -16,9 +16,9 @@ use std::{
 /// Commands and options of a `.geo` that read the file of the name that follows in quotes. (An unquoted name
 /// is known to gmsh alone.)
 const READERS: [&str; 4] = ["Include", "Merge", "ShapeFromFile", "FileName"];
-/// Commands of a `.geo` whose result depends on more than files, and the signs of an `.xdmf` and of an `.inp` that read files;
+/// Commands of a `.geo` whose result depends on more than files, and the signs of an `.xdmf`, an `.inp` and a `.bdf` that read files;
 /// in any case of their letters.
-const IMPURE: [&str; 4] = ["systemcall", "getenv", ".h5:", "input="];
+const IMPURE: [&str; 5] = ["systemcall", "getenv", ".h5:", "input=", "include'"];
 /// Signs between a reader and its name.
 const BEFORE_NAME: [char; 7] = [' ', '\t', '\r', '\n', '(', '=', '{'];
 

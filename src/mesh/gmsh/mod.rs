@@ -40,9 +40,22 @@ pub fn load(
     parameters: &BTreeMap<String, f64>,
     order: Order,
 ) -> Result<Mesh, MeshError> {
+    load_choosing(path, parameters, None, order)
+}
+
+/// As [`load`]; of a mesh of another program with arrays on its cells, the array `materials` has the numbers of the materials.
+///
+/// # Errors
+/// Those of [`load`], and no array has this name.
+pub fn load_choosing(
+    path: &Path,
+    parameters: &BTreeMap<String, f64>,
+    materials: Option<&str>,
+    order: Order,
+) -> Result<Mesh, MeshError> {
     let mesh = match Format::of(path) {
         Some(Format::Msh) => read(path),
-        Some(format) => kept(path, format, parameters, order),
+        Some(format) => kept(path, format, (parameters, materials), order),
         None => Err(MeshError::file(path, format!("a mesh is {FORMATS}"))),
     };
     mesh.map(Mesh::in_morton_order)
@@ -75,7 +88,7 @@ pub fn load_graded(
         "};\nsizes = newf;\nField[sizes] = PostView;\nField[sizes].ViewIndex = PostProcessing.NbViews - 1;\n\
          Background Field = sizes;\n",
     );
-    let bytes = run((geo, None), arguments(parameters), &last, "mesh it")?;
+    let bytes = run(geo, arguments(parameters), &last)?;
     parse_made(&bytes, geo).map(Mesh::in_morton_order)
 }
 
@@ -83,7 +96,7 @@ pub fn load_graded(
 fn kept(
     geo: &Path,
     format: Format,
-    parameters: &BTreeMap<String, f64>,
+    (parameters, materials): (&BTreeMap<String, f64>, Option<&str>),
     order: Order,
 ) -> Result<Mesh, MeshError> {
     let text = read_text(geo).map_err(MeshError::io(geo))?;
@@ -114,10 +127,11 @@ fn kept(
     name.push(if is_quadratic { ".order2.msh" } else { ".msh" });
     let path = geo.with_file_name(name);
 
-    let arguments = arguments(parameters);
+    let chosen = materials.map(|name| format!("materials={name}").into());
+    let arguments = arguments(parameters).into_iter().chain(chosen).collect::<Vec<OsString>>();
     let last = match format {
         Format::Geometry => last_words(&text, parameters, order),
-        _ => convert::SCRIPT.to_owned(),
+        _ => convert::sources(),
     };
     let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
     let digest = inputs.digest(&arguments, &last);
@@ -132,8 +146,8 @@ fn kept(
         return parse(file, &path);
     }
     let bytes = match format {
-        Format::Geometry => run((geo, None), arguments, &last, "mesh it")?,
-        _ => convert::run(geo)?,
+        Format::Geometry => run(geo, arguments, &last)?,
+        _ => convert::run(geo, materials)?,
     };
     let mesh = parse_made(&bytes, geo)?;
     if whole_file::is_free(&path, || origin.is_some()) {

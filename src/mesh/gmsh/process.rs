@@ -46,16 +46,14 @@ pub fn is_script(file: &Path) -> bool {
 }
 
 /// Runs gmsh with `arguments` on the file `input` and then on a file with the text `last`. Returns the bytes
-/// of the MSH 4.1 file that gmsh makes, with gmsh's version as a comment at its end. If `bytes` are given, they replace
-/// the contents of `input`. `task` completes "gmsh could not …" in messages.
+/// of the MSH 4.1 file that gmsh makes, with gmsh's version as a comment at its end.
 ///
 /// # Errors
 /// gmsh is missing, takes too long, reports an error or makes an incomplete file, or a signal came.
 pub fn run(
-    (input, bytes): (&Path, Option<&[u8]>),
+    input: &Path,
     arguments: impl IntoIterator<Item = OsString>,
     last: &str,
-    task: &str,
 ) -> Result<Vec<u8>, MeshError> {
     let scratch = tempfile::tempdir().map_err(MeshError::io(&env::temp_dir()))?;
     let [made, second, version, squares, log] =
@@ -69,23 +67,16 @@ pub fn run(
     fs::write(&second, last).map_err(MeshError::io(&second))?;
     let mut command = Command::new("gmsh");
     command.args(["-format", "msh41", "-v", "1"]).args(arguments).arg("-o").arg(&made);
-    match bytes {
-        // A copy, as gmsh would also run the options in a file INPUT.opt.
-        Some(bytes) => {
-            let copy = scratch.path().join("old.msh");
-            fs::write(&copy, bytes).map_err(MeshError::io(&copy))?;
-            command.arg(copy);
-        }
+    if is_script(input) {
         // Without "./" gmsh would take a path that begins with a dash for an option.
-        None if is_script(input) => drop(command.arg(Path::new(".").join(input))),
+        command.arg(Path::new(".").join(input));
+    } else {
         // gmsh would run a file with an ending in other letters, as .Step, and options beside it, as scripts.
-        None => {
-            let ending = input.extension().unwrap_or_default().to_ascii_lowercase();
-            let link = scratch.path().join("geometry").with_extension(ending);
-            let target = fs::canonicalize(input).map_err(MeshError::io(input))?;
-            symlink(target, &link).map_err(MeshError::io(&link))?;
-            command.arg(link);
-        }
+        let ending = input.extension().unwrap_or_default().to_ascii_lowercase();
+        let link = scratch.path().join("geometry").with_extension(ending);
+        let target = fs::canonicalize(input).map_err(MeshError::io(input))?;
+        symlink(target, &link).map_err(MeshError::io(&link))?;
+        command.arg(link);
     }
     // Without a home gmsh would run the scripts .gmshrc and .gmsh-options in the current folder.
     if env::var_os("HOME").is_none_or(|home| home.is_empty()) {
@@ -99,14 +90,14 @@ pub fn run(
     let child = child.map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => {
             let problem = format!(
-                "gmsh is needed to {task} and was not found; install it with `make deps` (Debian: \
+                "gmsh is needed to mesh it and was not found; install it with `make deps` (Debian: \
                  apt install gmsh)"
             );
             MeshError::file(input, problem)
         }
         _ => MeshError::io(Path::new("gmsh"))(source),
     })?;
-    let status = wait(child, &squares, input, task)?;
+    let status = wait(child, &squares, input)?;
 
     let said = fs::read(&log).map_err(MeshError::io(&log))?;
     // OpenCASCADE colours its messages: \x1b[…m.
@@ -133,7 +124,7 @@ pub fn run(
     let mut seen = HashSet::new();
     let lines: Vec<&str> = said.lines().filter(|line| seen.insert(*line)).take(SHOWN).collect();
     let message = if lines.is_empty() { format!("no message, {status}") } else { lines.join("\n") };
-    Err(MeshError::file(input, format!("gmsh could not {task}:\n{message}")))
+    Err(MeshError::file(input, format!("gmsh could not mesh it:\n{message}")))
 }
 
 /// Shows the user a note on a file at once.
@@ -142,12 +133,7 @@ pub fn note(file: &Path, text: &str) {
 }
 
 /// Waits for gmsh. Ends it after the time limit or on a signal to this process.
-fn wait(
-    mut gmsh: Child,
-    squares: &Path,
-    input: &Path,
-    task: &str,
-) -> Result<ExitStatus, MeshError> {
+fn wait(mut gmsh: Child, squares: &Path, input: &Path) -> Result<ExitStatus, MeshError> {
     let (started, _interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
@@ -186,7 +172,7 @@ fn wait(
         }
         if late {
             let problem = format!(
-                "gmsh could not {task} in {limit} s and was ended; give a larger size, or more time \
+                "gmsh could not mesh it in {limit} s and was ended; give a larger size, or more time \
                  in the environment variable {SECONDS_VARIABLE}"
             );
             return Err(MeshError::file(input, problem));

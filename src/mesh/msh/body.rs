@@ -4,7 +4,7 @@ use super::{
     super::{Curve, Mesh, Side, boundary_edges, extent, place, sides, twice_area},
     byte_reader::{Result, error_at},
     contents::{Contents, Element, Node},
-    flat, one_body, slit,
+    flat, one_body, quadrilaterals, slit,
 };
 use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use std::collections::BTreeMap;
@@ -13,7 +13,9 @@ use std::collections::BTreeMap;
 const PLANAR: f64 = 1e-6;
 
 /// The mesh of the body. It has no nodes without triangles, such as the centres of arcs.
-pub fn mesh(contents: &Contents) -> Result<Mesh> {
+pub fn mesh(mut contents: Contents) -> Result<Mesh> {
+    quadrilaterals::divide(&mut contents)?;
+    let contents = &contents;
     let (elements, mut surfaces) = triangles(contents);
     if elements.is_empty() {
         let none = "there are no triangles: with physical groups gmsh writes these alone, so name the body in the \
@@ -54,7 +56,11 @@ pub fn mesh(contents: &Contents) -> Result<Mesh> {
     one_body::check(&nodes, &triangles, &sides)?;
     let curves = curves(contents, &index, &sides);
     let points = (0..listed.len()).filter(|&node| listed[node].is_point).collect();
-    let notes = [ungrouped(contents, extent(&nodes)), slit::note(&nodes, &boundary_edges(&sides))];
+    let cut = (contents.divided > 0).then(|| {
+        format!("its {} quadrilaterals are cut into two triangles each", contents.divided)
+    });
+    let notes =
+        [cut, ungrouped(contents, extent(&nodes)), slit::note(&nodes, &boundary_edges(&sides))];
     let notes = notes.into_iter().flatten().collect();
     let mut mesh = Mesh { nodes, triangles, curves, surfaces, points, notes, ..Mesh::default() };
     if !contents.midpoints.is_empty() {
@@ -161,7 +167,7 @@ fn listed_twice<T>(node: &Node) -> Result<T> {
     error_at(node.at, format!("node {} is listed twice", node.tag))
 }
 
-fn missing_node<T>(element: u64, node: u64, at: usize) -> Result<T> {
+pub fn missing_node<T>(element: u64, node: u64, at: usize) -> Result<T> {
     error_at(at, format!("element {element} refers to node {node}, which $Nodes does not list"))
 }
 
@@ -182,13 +188,13 @@ fn set_midpoints(
     }
     for &&Element { tag, nodes: [a, b, c], at, .. } in elements {
         for [a, b] in [[a, b], [b, c], [c, a]] {
-            let Some(midpoint) = contents.midpoints.get(&[a.min(b), a.max(b)]) else {
+            let Some(midpoint) = contents.midpoint([a, b]) else {
                 return error_at(
                     at,
                     format!("triangle {tag} is of order 1, others are of order 2"),
                 );
             };
-            let Some(node) = listed.get(midpoint) else { return missing_node(tag, *midpoint, at) };
+            let Some(node) = listed.get(&midpoint) else { return missing_node(tag, midpoint, at) };
             check_planar(node, plane)?;
             mesh.set_midpoint([index[&a], index[&b]], [node.point[0], node.point[1]]);
         }

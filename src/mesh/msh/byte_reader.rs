@@ -45,7 +45,7 @@ impl<'a> Section<'a> {
             }
             let name = line.trim_ascii_end().strip_prefix(b"$");
             let name = match name.and_then(|name| str::from_utf8(name).ok()) {
-                Some(name @ ("MeshFormat" | "Comments")) => name,
+                Some(name @ ("MeshFormat" | "Comments" | "NOD")) => name,
                 _ if sections.is_empty() => return not_a_mesh(at),
                 Some(name) => name,
                 None => {
@@ -54,7 +54,9 @@ impl<'a> Section<'a> {
                 }
             };
             let start = at + line.len();
-            let last = format!("$End{name}");
+            // The sections of version 1 have capitals.
+            let last = if matches!(name, "NOD" | "ELM") { "$END" } else { "$End" };
+            let last = format!("{last}{name}");
             let mut dollars = (start..bytes.len()).filter(|&i| bytes[i] == b'$');
             let end = dollars.find(|&i| bytes[i..].starts_with(last.as_bytes()));
             sections.push(Self { name, at, bytes: &bytes[..end.unwrap_or(bytes.len())], start });
@@ -83,19 +85,34 @@ fn blanks(bytes: &[u8]) -> usize {
 pub struct ByteReader<'a> {
     section: &'a Section<'a>,
     position: usize,
-    /// Are numbers binary, tags and counts with eight bytes (`size_t`)? Otherwise they are words between blanks.
+    pub encoding: Encoding,
+}
+
+/// How a file writes its numbers.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Encoding {
+    /// Are they binary, counts with eight bytes (`size_t`)? Otherwise they are words between blanks.
     pub is_binary: bool,
+    /// Do binary numbers have the byte order of other machines?
+    pub is_swapped: bool,
+    /// Do binary tags of nodes and elements have four bytes (`int`), as before version 4.1, or eight?
+    pub has_short_tags: bool,
 }
 
 impl<'a> ByteReader<'a> {
     /// A reader at the start of `section`.
-    pub fn new(section: &'a Section, is_binary: bool) -> Self {
-        Self { section, position: section.start, is_binary }
+    pub fn new(section: &'a Section, encoding: Encoding) -> Self {
+        Self { section, position: section.start, encoding }
+    }
+
+    /// The name of the section.
+    pub fn section_name(&self) -> &'a str {
+        self.section.name
     }
 
     /// The byte of the next item, after the blanks of a text file.
     pub fn position(&mut self) -> usize {
-        if !self.is_binary {
+        if !self.encoding.is_binary {
             self.position += blanks(self.rest());
         }
         self.position
@@ -133,7 +150,16 @@ impl<'a> ByteReader<'a> {
         self.number(what, i32::from_ne_bytes)
     }
 
-    /// A tag or a count: a whole number that is not negative.
+    /// The tag of a node or an element: a whole number that is not negative.
+    pub fn tag(&mut self, what: &str) -> Result<u64> {
+        let Encoding { is_binary: true, has_short_tags: true, .. } = self.encoding else {
+            return self.size(what);
+        };
+        let (at, tag) = (self.position(), self.int(what)?);
+        u64::try_from(tag).or_else(|_| expected(at, what, tag))
+    }
+
+    /// A count: a whole number that is not negative.
     pub fn size(&mut self, what: &str) -> Result<u64> {
         self.number(what, u64::from_ne_bytes)
     }
@@ -150,9 +176,12 @@ impl<'a> ByteReader<'a> {
         from_bytes: fn([u8; N]) -> T,
     ) -> Result<T> {
         let at = self.position();
-        if self.is_binary {
+        if self.encoding.is_binary {
             let bytes = self.take(what, N)?;
-            return Ok(from_bytes(std::array::from_fn(|i| bytes[i])));
+            let is_swapped = self.encoding.is_swapped;
+            return Ok(from_bytes(std::array::from_fn(|i| {
+                bytes[if is_swapped { N - 1 - i } else { i }]
+            })));
         }
         let length = self.rest().iter().take_while(|b| !b.is_ascii_whitespace()).count();
         let word = String::from_utf8_lossy(self.take(what, length.max(1))?);

@@ -32,13 +32,18 @@ pub struct Contents {
     pub names: BTreeMap<(i32, i32), String>,
     /// Physical groups of the entities, by dimension and tag.
     pub groups: HashMap<(i32, i32), Vec<i32>>,
-    /// Whether the entities are the physical groups themselves.
-    pub groups_are_entities: bool,
+    /// The version of the format.
+    pub version: f64,
     pub nodes: Vec<Node>,
     /// The lines in physical groups, once for each group.
     pub lines: Vec<Element<2>>,
     /// The triangles, once for each of their groups.
     pub triangles: Vec<Element<3>>,
+    /// The quadrilaterals, once for each of their groups, with the node at their centre, if they have one; until they
+    /// are divided.
+    pub quadrilaterals: Vec<(Element<4>, Option<u64>)>,
+    /// The number of quadrilaterals that were cut into triangles.
+    pub divided: usize,
     /// Tags of the midpoint nodes of second-order elements, by the vertices of their edges in increasing
     /// order.
     pub midpoints: HashMap<[u64; 2], u64>,
@@ -48,6 +53,11 @@ impl Contents {
     /// The name of a physical group, or its tag.
     pub fn name(&self, dimension: i32, group: i32) -> String {
         self.names.get(&(dimension, group)).cloned().unwrap_or_else(|| group.to_string())
+    }
+
+    /// The midpoint node of the edge between two nodes of a second-order element.
+    pub fn midpoint(&self, [a, b]: [u64; 2]) -> Option<u64> {
+        self.midpoints.get(&[a.min(b), a.max(b)]).copied()
     }
 
     /// Reads the coordinates of the node `tag`, which is listed at byte `at`.
@@ -69,7 +79,7 @@ impl Contents {
     }
 
     /// Reads the nodes of the element `tag` of gmsh's `element_type`, which is listed at byte `at`. The
-    /// contents get it once for each of its physical `groups`; a triangle without groups gets group 0.
+    /// contents get it once for each of its physical `groups`; without groups, faces get group 0.
     pub fn read_element(
         &mut self,
         reader: &mut ByteReader,
@@ -77,6 +87,7 @@ impl Contents {
         (tag, at): (u64, usize),
         groups: &[i32],
     ) -> Result<()> {
+        let faces = if groups.is_empty() { &[0] } else { groups };
         let (name, mend) = match element_type {
             1 | 8 => {
                 let nodes = node_tags(reader)?;
@@ -92,22 +103,30 @@ impl Contents {
                 if element_type == 9 {
                     self.read_midpoints(reader, &[[a, b], [b, c], [c, a]], tag, at)?;
                 }
-                let groups = if groups.is_empty() { &[0] } else { groups };
                 let of = |&group: &i32| Element { tag, group, nodes, at };
-                self.triangles.extend(groups.iter().map(of));
+                self.triangles.extend(faces.iter().map(of));
+                return Ok(());
+            }
+            3 | 10 | 16 => {
+                let nodes @ [a, b, c, d] = node_tags(reader)?;
+                if element_type != 3 {
+                    self.read_midpoints(reader, &[[a, b], [b, c], [c, d], [d, a]], tag, at)?;
+                }
+                let centre = (element_type == 10).then(|| reader.tag("a node tag")).transpose()?;
+                let of = |&group: &i32| (Element { tag, group, nodes, at }, centre);
+                self.quadrilaterals.extend(faces.iter().map(of));
                 return Ok(());
             }
             // A point.
             15 => return node_tags::<1>(reader).map(drop),
-            3 | 10 | 16 | 36 | 37 => {
-                ("quadrangle", "mesh without Recombine, or cut it into triangles")
+            20..=28 | 36 | 37 => {
+                ("an element of higher order", "mesh with Mesh.ElementOrder = 1 or 2")
             }
-            20..=28 => ("line or triangle of higher order", "mesh with Mesh.ElementOrder = 1 or 2"),
             4..=7 | 11..=14 | 17..=19 | 29 => ("solid", "mesh with `gmsh -2`"),
             _ => ("unknown", "mesh with `gmsh -2`"),
         };
         let problem = format!(
-            "element {tag} is of gmsh's type {element_type} ({name}), not a triangle of order 1 or 2; {mend}"
+            "element {tag} is of gmsh's type {element_type} ({name}), not a triangle or quadrilateral of order 1 or 2; {mend}"
         );
         error_at(at, problem)
     }
@@ -121,7 +140,10 @@ impl Contents {
         at: usize,
     ) -> Result<()> {
         for &[a, b] in edges {
-            let node = reader.size("a node tag")?;
+            let node = reader.tag("a node tag")?;
+            if a == b {
+                continue;
+            }
             let first = *self.midpoints.entry([a.min(b), a.max(b)]).or_insert(node);
             if node != first {
                 let problem = format!(
@@ -138,7 +160,7 @@ impl Contents {
 fn node_tags<const N: usize>(reader: &mut ByteReader) -> Result<[u64; N]> {
     let mut tags = [0; N];
     for tag in &mut tags {
-        *tag = reader.size("a node tag")?;
+        *tag = reader.tag("a node tag")?;
     }
     Ok(tags)
 }

@@ -1,4 +1,4 @@
-//! `$Entities`, `$Nodes` and `$Elements` of MSH 4.1, in blocks for each entity.
+//! `$Entities`, `$Nodes` and `$Elements` of MSH 4.0 and 4.1, in blocks for each entity.
 
 use super::{
     byte_reader::{ByteReader, Result, expected},
@@ -13,8 +13,8 @@ pub fn entities(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
     for (dimension, count) in (0..).zip(counts) {
         for _ in 0..count {
             let tag = reader.int("an entity tag")?;
-            // A point has three coordinates, other entities have the six of their bounding box.
-            for _ in 0..if dimension == 0 { 3 } else { 6 } {
+            // A point has three coordinates since 4.1, other entities have the six of their bounding box.
+            for _ in 0..if dimension == 0 && contents.version > 4.0 { 3 } else { 6 } {
                 reader.real("a number")?;
             }
             let groups = contents.groups.entry((dimension, tag)).or_default();
@@ -34,19 +34,25 @@ pub fn entities(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
 pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
     let before = contents.nodes.len();
     let start = reader.position();
-    let (blocks, announced) = header(reader)?;
+    let (blocks, announced) = header(reader, contents)?;
     for _ in 0..blocks {
-        let dimension = reader.int("a dimension")?;
-        reader.int("an entity tag")?;
+        let (dimension, _) = entity(reader, contents)?;
         let parametric = reader.int("0 or 1 (parametric nodes)")? != 0;
-        // A converted file lacks the points that are in no physical group.
-        let is_point = dimension == 0 && !contents.groups_are_entities;
+        // Since 4.1 the tags of a block stand before its coordinates.
+        let count = reader.size("a count")?;
+        let is_together = contents.version == 4.0;
         let mut tags = Vec::new();
-        for _ in 0..reader.size("a count")? {
-            tags.push((reader.position(), reader.size("a node tag")?));
+        for _ in 0..if is_together { 0 } else { count } {
+            let at = reader.position();
+            tags.push((reader.tag("a node tag")?, at));
         }
-        for (at, tag) in tags {
-            contents.read_node(reader, (tag, at), is_point)?;
+        for number in 0..count {
+            let at = reader.position();
+            let node = match is_together {
+                true => (reader.tag("a node tag")?, at),
+                false => tags[number as usize],
+            };
+            contents.read_node(reader, node, dimension == 0)?;
             // A parametric node has one more number per dimension of its entity.
             for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
                 reader.real("a number")?;
@@ -58,20 +64,16 @@ pub fn nodes(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
 
 pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> {
     let start = reader.position();
-    let (blocks, announced) = header(reader)?;
+    let (blocks, announced) = header(reader, contents)?;
     let mut found = 0;
     for _ in 0..blocks {
-        let dimension = reader.int("a dimension")?;
-        let entity = reader.int("an entity tag")?;
+        let entity = entity(reader, contents)?;
         let element_type = reader.int("an element type")?;
         let count = reader.size("a count")?;
-        let groups = match contents.groups_are_entities {
-            true => Vec::from_iter((entity != 0).then(|| entity.saturating_abs())),
-            false => contents.groups.get(&(dimension, entity)).cloned().unwrap_or_default(),
-        };
+        let groups = contents.groups.get(&entity).cloned().unwrap_or_default();
         for _ in 0..count {
             let at = reader.position();
-            let tag = reader.size("an element tag")?;
+            let tag = reader.tag("an element tag")?;
             contents.read_element(reader, element_type, (tag, at), &groups)?;
         }
         found += count;
@@ -80,11 +82,20 @@ pub fn elements(reader: &mut ByteReader, contents: &mut Contents) -> Result<()> 
 }
 
 /// The number of blocks, and the number of items in all blocks. Skips the range of their tags.
-pub fn header(reader: &mut ByteReader) -> Result<(u64, u64)> {
+fn header(reader: &mut ByteReader, contents: &Contents) -> Result<(u64, u64)> {
     let counts = (reader.size("a count")?, reader.size("a count")?);
-    reader.size("the smallest tag")?;
-    reader.size("the largest tag")?;
+    if contents.version > 4.0 {
+        reader.size("the smallest tag")?;
+        reader.size("the largest tag")?;
+    }
     Ok(counts)
+}
+
+/// The dimension and the tag of the entity of a block; before 4.1 the tag comes first.
+fn entity(reader: &mut ByteReader, contents: &Contents) -> Result<(i32, i32)> {
+    let first = reader.int("a dimension or an entity tag")?;
+    let second = reader.int("an entity tag or a dimension")?;
+    Ok(if contents.version == 4.0 { (second, first) } else { (first, second) })
 }
 
 fn check_total(at: usize, what: &str, announced: u64, found: u64) -> Result<()> {
