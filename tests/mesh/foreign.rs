@@ -1,7 +1,7 @@
 //! Meshes of other programs: their sets are the physical groups of the same mesh from gmsh.
 
 use crate::common::{check_laws, close, curve_length, curved_area, length, triangle_areas};
-use signorini::mesh::{Mesh, Order, distance, load, sorted};
+use signorini::mesh::{Mesh, Order, distance, load, load_choosing, sorted};
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write,
@@ -81,40 +81,127 @@ fn groups_of_gmsh_survive_the_formats_with_names() {
     }
 }
 
-#[test]
-fn tags_name_the_groups_of_formats_without_names() {
-    let folder = tempfile::tempdir().unwrap();
-    let [geo, bulk] = made(folder.path(), Order::Linear, "bdf");
-    assert_eq!(geo.triangles.len(), bulk.triangles.len());
-    // The numbers of the two surfaces of the geometry, and of its curves, in single precision.
-    let [curves, surfaces] = measures(&bulk);
-    assert_eq!(surfaces.len(), 2);
-    assert!(surfaces.values().any(|area| (area - 1.0).abs() < 1e-5), "{surfaces:?}");
-    assert!(curves.len() >= 3, "{curves:?}");
-
-    let vtu = |types: [u8; 3], tags: &str| {
-        let array = |name: &str, kind: &str, components: usize, of: &str| {
-            format!(
-                "<DataArray Name='{name}' type='{kind}' NumberOfComponents='{components}' format='ascii'>{of}</DataArray>"
-            )
-        };
-        let types = types.map(|t| t.to_string()).join(" ");
+/// A mesh in VTK of a quadrilateral, a triangle and a line, with these types of cells and arrays of whole numbers.
+fn vtu(types: [u8; 3], arrays: &[(&str, &str)]) -> String {
+    let array = |name: &str, kind: &str, components: usize, of: &str| {
         format!(
-            "<?xml version='1.0'?><VTKFile type='UnstructuredGrid' version='0.1' byte_order='LittleEndian'>\
-             <UnstructuredGrid><Piece NumberOfPoints='5' NumberOfCells='3'><Points>{}</Points><Cells>{}{}{}</Cells>\
-             <CellData>{}</CellData></Piece></UnstructuredGrid></VTKFile>",
-            array("Points", "Float64", 3, "0 0 0  2 0 0  2 1 0  0 1 0  1 2 0"),
-            array("connectivity", "Int64", 1, "0 1 2 3  3 2 4  0 1"),
-            array("offsets", "Int64", 1, "4 7 9"),
-            array("types", "UInt8", 1, &types),
-            array("part", "Int64", 1, tags)
+            "<DataArray Name='{name}' type='{kind}' NumberOfComponents='{components}' format='ascii'>{of}</DataArray>"
         )
     };
-    let mesh = read("part.vtu", &vtu([9, 5, 3], "7 8 9")).unwrap();
-    let [curves, surfaces] = measures(&mesh);
-    assert_eq!((curves["9"], surfaces["7"], surfaces["8"]), (2.0, 2.0, 1.0));
-    let solid = read("part.vtu", &vtu([10, 5, 3], "7 8 9")).unwrap_err();
-    assert!(solid.contains("part.vtu: element 1 has 4 nodes in 3 dimensions"), "{solid}");
+    let types = types.map(|t| t.to_string()).join(" ");
+    let cells: String =
+        arrays.iter().map(|(name, values)| array(name, "Int64", 1, values)).collect();
+    format!(
+        "<?xml version='1.0'?><VTKFile type='UnstructuredGrid' version='0.1' byte_order='LittleEndian'>\
+         <UnstructuredGrid><Piece NumberOfPoints='5' NumberOfCells='3'><Points>{}</Points><Cells>{}{}{}</Cells>\
+         <CellData>{cells}</CellData></Piece></UnstructuredGrid></VTKFile>",
+        array("Points", "Float64", 3, "0 0 0  2 0 0  2 1 0  0 1 0  1 2 0"),
+        array("connectivity", "Int64", 1, "0 1 2 3  3 2 4  0 1"),
+        array("offsets", "Int64", 1, "4 7 9"),
+        array("types", "UInt8", 1, &types),
+    )
+}
+
+#[test]
+fn the_array_of_the_materials_is_no_list_of_ids_and_is_said() {
+    let flat = [9, 5, 3];
+    let ids = [
+        ("GlobalCellIds", "11 12 13"),
+        ("vtkGhostType", "0 0 0"),
+        ("vtkOriginalCellIds", "1 2 3"),
+        ("GlobalElementId", "1 2 3"),
+        ("cell_id", "4 5 6"),
+        ("vtkProcessId", "0 1 0"),
+    ];
+    for others in [&ids[..0], &ids[..1], &ids[..]] {
+        // The number 0 is a material as well.
+        for (values, quadrilateral) in [("7 8 9", "7"), ("0 8 9", "0")] {
+            let text = vtu(flat, &[others, &[("part", values)]].concat());
+            let mesh = read("part.vtu", &text).unwrap();
+            let [curves, surfaces] = measures(&mesh);
+            let found = (curves["9"], surfaces[quadrilateral], surfaces["8"]);
+            assert_eq!(found, (2.0, 2.0, 1.0), "{others:?}");
+            assert!(mesh.notes.iter().any(|note| note.contains("the array \"part\"")), "{mesh:?}");
+        }
+        let none = read("part.vtu", &vtu(flat, &[others, &[("part", "0 0 0")]].concat())).unwrap();
+        assert!(none.surfaces.is_empty() && none.curves.is_empty(), "{none:?}");
+    }
+    let several = vtu(flat, &[("part", "7 8 9"), ("other", "1 1 2")]);
+    let message = read("part.vtu", &several).unwrap_err();
+    assert!(message.contains("(part, other): write mesh.materials = \"part\""), "{message}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.vtu");
+    fs::write(&path, several).unwrap();
+    let choosing = |name| load_choosing(&path, &BTreeMap::new(), Some(name), Order::Linear);
+    for _ in 0..2 {
+        let names = |name| choosing(name).unwrap().surfaces.into_keys().collect::<Vec<_>>();
+        assert_eq!(
+            (names("part"), names("other"), names("").len()),
+            (vec!["7".into(), "8".into()], vec!["1".into()], 0)
+        );
+    }
+    let unknown = choosing("there").unwrap_err().to_string();
+    assert!(
+        unknown
+            .contains("\"there\" is no array of whole numbers on the cells (known: part, other)")
+    );
+
+    let ghosts = read("part.vtu", &vtu(flat, &[("vtkGhostType", "0 1 0")])).unwrap_err();
+    assert!(ghosts.contains("1 of its cells are ghosts (vtkGhostType)"), "{ghosts}");
+    let solid = read("part.vtu", &vtu([10, 5, 3], &[("part", "7 8 9")])).unwrap_err();
+    assert!(solid.contains("cells of type tetra with 4 nodes are not read"), "{solid}");
+}
+
+/// Nastran is read where PYTHON has pyNastran, and refused with this sentence elsewhere.
+fn nastran(text: &str) -> Option<Result<Mesh, String>> {
+    let read = read("part.bdf", text);
+    match &read {
+        Err(message) if message.contains("Nastran is read by pyNastran, which Python lacks") => {
+            None
+        }
+        _ => Some(read),
+    }
+}
+
+#[test]
+fn nodes_of_nastran_stand_where_their_coordinate_system_puts_them() {
+    // The square (1, 0) … (0, 2) in polar coordinates: by CP, by GRDSET, and by a system that is turned and moved.
+    let face = "CQUAD4,1,,1,2,3,4,45.\nCROD,2,7,1,2\n";
+    let polar = |system: &str, cp: &str, default: &str| {
+        let nodes = [("1.", "0."), ("2.D+0", "0."), ("2.", "90."), ("1+0", "90.")];
+        let grids =
+            (1..).zip(nodes).map(|(i, (r, angle))| format!("GRID,{i},{cp},{r},{angle},0.\n"));
+        format!("{system}\n{default}{}{face}", grids.collect::<String>())
+    };
+    let c = "CORD2C,1,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.";
+    let r = "cord2r\t1\t\t5.\t0.\t0.\t5.\t0.\t1.\n\t5.\t1.\t0.";
+    let plain = polar("", "", "").replace("2.,90.", "0.,2.").replace("1+0,90.", "0.,1.");
+    for (text, shift) in [
+        (plain, 0.0),
+        (polar(c, "1", ""), 0.0),
+        (polar(c, "", "GRDSET,,1\n"), 0.0),
+        (polar(&c.to_lowercase(), "1", ""), 0.0),
+        (polar(r, "1", "").replace("2.,90.", "0.,2.").replace("1+0,90.", "0.,1."), 5.0),
+    ] {
+        let Some(mesh) = nastran(&text) else { return };
+        let mesh = mesh.unwrap();
+        close(triangle_areas(&mesh).sum(), 1.5);
+        close(curve_length(&mesh, "7"), 1.0);
+        assert_eq!(mesh.surfaces.keys().collect::<Vec<_>>(), ["1"]);
+        let least = mesh.nodes.iter().map(|at| at[0]).fold(f64::MAX, f64::min);
+        close(least, if shift == 0.0 { 0.0 } else { 3.0 });
+    }
+    for (text, fragment) in [
+        ("GRID,1,,0.,0.,0.\nGMCORD,1\n", "the card GMCORD is not read"),
+        ("GRID,1,,0.,0.,0.\nCHEXA,1,1,1,2,3,4,5,6\n,7,8\n", "the card CHEXA is not read"),
+        ("GRID,1,9,0.,0.,0.\n", "pyNastran does not read it"),
+        ("GRID,1,,0.,0.,0.\nGRID,1,,1.,0.,0.\n", "pyNastran does not read it"),
+        ("GRID,1,,x,0.,0.\n", "must be a float"),
+        ("CTRIA3,1,1,1,2,9\n", "refers to node 1"),
+    ] {
+        let Some(Err(message)) = nastran(text) else { panic!("{text}") };
+        assert!(message.contains(fragment) && message.lines().count() == 1, "{message}");
+    }
 }
 
 /// The nodes and elements of an n×n square of quadrilaterals in Abaqus, of order 1 or 2. Its nodes are moved by `at`.
@@ -240,12 +327,8 @@ fn malformed_files_are_refused_with_their_place() {
         ("a.inp", "*INCLUDE, INPUT=lost.inp\n", &["line 1: the file lost.inp does not exist"]),
         ("a.inp", "*PART, NAME=a\n*PART, NAME=b\n", &["line 2: there are several parts"]),
         ("a.unv", "    -1\n  2411\nx\n", &["a.unv: there are no triangles"]),
-        ("a.vtu", "<VTKFile", &["a.vtu: it cannot be read as .vtu", "export it as"]),
-        (
-            "a.bdf",
-            "CTRIA3  1       1       1       2       9\n",
-            &["a.bdf: it cannot be read as .bdf"],
-        ),
+        ("a.vtu", "<VTKFile", &["a.vtu: it cannot be read as .vtu (ParseError", "export it as"]),
+        ("a.vtk", "hello\n", &["a.vtk: it cannot be read as .vtk (ReadError: Illegal VTK header)"]),
     ];
     for (name, text, fragments) in cases {
         let message = read(name, text).unwrap_err();
