@@ -18,7 +18,7 @@ macro_rules! scripts {
 /// The scripts and the modules that they import from each other.
 pub(crate) const SCRIPTS: [(&str, &str); 33] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
-    "histories" "info" "limits" "lines" "maps" "meshes/abaqus" "meshes/by_meshio" "meshes/convert"
+    "histories" "info" "limits" "lines" "maps" "meshes/abaqus" "meshes/abaqus_keywords" "meshes/by_meshio" "meshes/convert"
     "meshes/description" "meshes/msh" "meshes/nastran" "meshes/universal" "paraview_script" "paraview_view" "principal"
     "reading" "report" "report_pdf" "results" "setting" "signorini_files" "signorini_results" "signorini_summaries" "study" "table"
 };

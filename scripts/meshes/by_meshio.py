@@ -73,25 +73,26 @@ def joined_nodes(numbers, points, mesh):
     return labels
 
 
-def whole(parts):
-    """The array on all blocks of cells, if it has one whole number a cell."""
-    return all(part.ndim == 1 and (part.dtype.kind in "iu" or (part == part.astype(int)).all()) for part in parts)
+def is_whole(parts, kinds="iuf"):
+    """Whether an array on the blocks of cells has one whole number a cell."""
+    return all(part.size == len(part) and part.dtype.kind in kinds and (part == part.astype(int)).all() for part in parts)
 
 
 def materials(read, mesh):
     """The name and the values of the array with the numbers of materials and curves."""
     arrays, chosen = read.cell_data, mesh.materials
-    integer = [name for name, parts in arrays.items() if whole(parts) and all(part.dtype.kind in "iu" for part in parts)]
+    integer = [name for name, parts in arrays.items() if is_whole(parts, "iu")]
+    numbers = lambda name: [part.astype(int).ravel() for part in arrays[name]]
     if chosen == "":
         return None, None
     if chosen is not None:
-        if chosen not in arrays or not whole(arrays[chosen]):
+        if chosen not in arrays or not is_whole(arrays[chosen]):
             refuse("", f'mesh.materials = "{chosen}" is no array of whole numbers on the cells (known: {", ".join(integer) or "none"})')
-        return chosen, [part.astype(int) for part in arrays[chosen]]
+        return chosen, numbers(chosen)
     found = [name for name in integer if not NO_MATERIALS.fullmatch(re.sub("[^a-z]", "", name.lower()))]
     if "gmsh:physical" in found:
         found = [name for name in found if name != "gmsh:geometrical"]
     if len(found) > 1:
         refuse("", f"several arrays on its cells may be the materials ({', '.join(found)}): write mesh.materials = \"{found[0]}\", or "
                    '"" for none')
-    return (found[0], arrays[found[0]]) if found else (None, None)
+    return (found[0], numbers(found[0])) if found else (None, None)

@@ -28,7 +28,7 @@ def main(program):
         # meshio ends the program where it cannot read a file; the messages of these modules are texts.
         if isinstance(error, SystemExit) and isinstance(error.code, str):
             raise
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        reason = f"{type(error).__name__}: {error}".splitlines()[0].rstrip(": ")
         sys.exit(f"it cannot be read as {path.suffix} ({reason}); export it as .inp, .unv or .msh")
     mesh.check()
     sys.stdout.write(msh.text(mesh))

@@ -1,16 +1,33 @@
 """The description of a plane mesh. Each format fills one, and msh.py writes it."""
+import re
 import sys
 from collections import defaultdict
 from dataclasses import dataclass
 
-# The numbers of nodes of lines and faces: the corners come first, then the middles of the sides, then the centre.
-SIZES = {1: (2, 3), 2: (3, 4, 6, 8, 9)}
+# The numbers of nodes of lines and faces: the corners come first, then the middles of the sides, then the centre. Masses and
+# springs have dimension 0; sets may name them.
+SIZES = {0: range(9), 1: (2, 3), 2: (3, 4, 6, 8, 9)}
 PLANE = "the mesh must be plane, of triangles or quadrilaterals (as CPS3, CPE4, CPS6 or CPE8)"
 
 
 def refuse(place, problem):
     """Ends the program with a message. The place is as `file.inp, line 12`, or empty."""
     sys.exit(f"{place}: {problem}" if place else problem)
+
+
+def whole(word):
+    """The whole number in a word. Python itself reads 1_0 too."""
+    if not re.fullmatch(r"[+-]?\d+", word.strip()):
+        raise ValueError(f"{word.strip() or 'nothing'} is no whole number")
+    return int(word)
+
+
+def real(word):
+    """The number in a word. Fortran also writes 1.D+0 and 1.5-3; a blank is 0."""
+    parts = re.fullmatch(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", word.strip() or "0")
+    if not parts:
+        raise ValueError(f"{word.strip()} is no number")
+    return float(f"{parts[1]}e{parts[2] or parts[3] or 0}")
 
 
 @dataclass

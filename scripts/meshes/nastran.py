@@ -1,5 +1,6 @@
 """Reads Nastran with pyNastran. A property is the set of its elements, with its number as name."""
 import contextlib
+import io
 import re
 import sys
 
@@ -20,7 +21,7 @@ HARMLESS = re.compile(
     r"|RBE\d|RBAR1?|RROD|RSPLINE|RTRPLT1?|SPOINT|EPOINT|SEQGP|SET\d|TABLE\w*|TAB\w+|EIG\w+|NLP\w+|TSTEP\w*|FREQ\d?|DTI|DM\w+|TF"
     r"|D(ESVAR|VPREL\d|VMREL\d|VCREL\d|VGRID|RESP\d|CON\w+|EQATN|LINK|OPTPRM|SCREEN|TABLE)|DOPTPRM|TOPVAR|MONPNT\d|ASSIGN"
     r"|AE\w+|CAERO\d|PAERO\d|SPLINE\d|FLUTTER|FLFACT|MKAERO\d|TRIM\d?|DIVERG|GUST|CSSCHD|BC\w+|BSURF\w*|BLSEG|BFRIC|BOUTPUT|GLUE"
-    r"|ECHO\w+|ENDDATA|INCLUDE")
+    r"|MDLPRM|ECHO\w+|ENDDATA|INCLUDE")
 
 
 def read(path, mesh):
@@ -40,8 +41,11 @@ def read(path, mesh):
     text = path.read_text(encoding="latin-1")
     try:
         with contextlib.redirect_stdout(sys.stderr):
-            model.read_bdf(path, xref=False, validate=False, encoding="latin-1",
-                           punch=not re.search(r"^\s*begin\s+bulk|^\s*begin\s*$", text, re.I | re.M))
+            # Many programs write the bulk data alone, with or without its first line.
+            is_whole = re.search(r"^\s*cend\b", text, re.I | re.M)
+            bulk = re.split(r"^\s*begin\b.*\n", text, maxsplit=1, flags=re.I | re.M)
+            source = path if is_whole or len(bulk) == 1 else io.StringIO(bulk[1])
+            model.read_bdf(source, xref=False, validate=False, encoding="latin-1", punch=not is_whole)
             check_cards(model)
             for node in model.nodes.values():
                 if model.grdset and node.has_default_system:

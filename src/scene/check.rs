@@ -140,7 +140,12 @@ impl Scene {
                     true => no_curves(mesh, &boundary.name),
                     false => suggestion(&boundary.name, &known),
                 };
-                format!("is no physical curve of the mesh{suggestion}")
+                match set_without_edges(mesh, &boundary.name) {
+                    Some(of) => {
+                        format!("is a set of {of}, and a boundary is made of edges{suggestion}")
+                    }
+                    None => format!("is no physical curve of the mesh{suggestion}"),
+                }
             }
         };
         Err(self.at_name(boundary, &problem))
@@ -261,6 +266,13 @@ impl Scene {
 /// A key of a boundary, in full.
 pub(super) fn boundary_key(name: &str, key: &str) -> String {
     format!("boundary.{name}.{key}")
+}
+
+/// What is in a set of this name, from the note of a mesh of another program on its sets without an edge.
+fn set_without_edges<'m>(mesh: &'m Mesh, name: &str) -> Option<&'m str> {
+    let start = format!(" {name} (");
+    let mut notes = mesh.notes.iter().filter(|note| note.starts_with("no edge of the boundary"));
+    notes.find_map(|note| Some(note.split_once(&start)?.1.split_once(')')?.0))
 }
 
 /// The end of a message about a mesh without physical curves: how to name them, and the corners between them.

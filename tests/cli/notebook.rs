@@ -36,6 +36,8 @@ scene = tomllib.load(open('scene.toml', 'rb'))
 given = run(scene, out='out/dict')
 for one in (opened, given):
     assert one.history.drop(columns='seconds').equals(path.history.drop(columns='seconds'))
+scene['mesh'] = {'file': __import__('pathlib').Path('square.msh').resolve()}
+assert run(scene, out='out/path of a mesh').columns['work'][-1] == path.columns['work'][-1]
 assert opened.folder.name == 'scene' and isinstance(path.history, pandas.DataFrame)
 assert path.columns['work'][-1] == path.history['work'].iloc[-1] > 0
 text = repr(path)
