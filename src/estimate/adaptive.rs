@@ -264,7 +264,7 @@ fn refined(
             before.clear();
             continue;
         }
-        let round = Round::new(&scene, mesh, run, accuracy)?;
+        let round = Round::new(session, &scene, mesh, run, accuracy)?;
         progress.estimated(triangles, round.resolves_data().then_some(round.error));
         let answer = Level::new(&round.run, mesh.clone());
         // The measured errors, or the reason why there are none.

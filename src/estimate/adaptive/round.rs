@@ -9,7 +9,7 @@ use super::{
 use crate::{
     evolution::AIM,
     mesh::{Mesh, MeshError, Order, Refinement, sorted},
-    petsc::PetscError,
+    petsc::{PetscError, Session},
     problem::unresolved,
     scene::Scene,
 };
@@ -59,6 +59,7 @@ pub(super) struct Round<'a> {
 
 impl<'a> Round<'a> {
     pub(super) fn new(
+        session: &Session,
         scene: &'a Scene,
         mesh: &'a Mesh,
         run: FewStepRun<'a>,
@@ -71,9 +72,10 @@ impl<'a> Round<'a> {
             (point.at, here.sum())
         });
         let singular = singular.collect();
-        let displacement = run.displacement();
+        let (displacement, end) = (run.displacement(), &run.outcome.last.state);
+        let unresolved = unresolved(session, run.problem, end, accuracy, displacement)?;
         Ok(Self {
-            unresolved: unresolved(scene, mesh, accuracy, displacement),
+            unresolved,
             deepest: accuracy * displacement,
             open: run.open() / accuracy,
             singular,
