@@ -122,7 +122,7 @@ def _foundation(results, time, displacement):
     is x + d with d·ν = g for both, and it does not slide.
     """
     def prescribed(of, node, edge_normal):
-        # A prescribed node has no row in contact.csv, but a gap in the scene.
+        # In results of version 0.2.0 a prescribed node has no row in contact.csv, but a gap in the scene.
         at = partial(evaluate, points=node[None], t=time, folder=results.folder)
         normal = np.ravel([at(part) for part in of["normal"]]) if "normal" in of else edge_normal
         return at(of["gap"]) * normal / np.linalg.norm(normal), np.zeros(2)

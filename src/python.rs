@@ -16,7 +16,7 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-pub(crate) const SCRIPTS: [(&str, &str); 33] = scripts! {
+pub(crate) const SCRIPTS: [(&str, &str); 34] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
     "histories" "info" "limits" "lines" "maps" "meshes/abaqus" "meshes/abaqus_keywords" "meshes/by_meshio" "meshes/convert"
     "meshes/description" "meshes/msh" "meshes/nastran" "meshes/universal" "paraview_script" "paraview_view" "principal"

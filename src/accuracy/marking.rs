@@ -8,7 +8,7 @@ use super::{
 use crate::{
     evolution::AIM,
     mesh::{Mesh, MeshError, Order, Refinement, sorted},
-    petsc::PetscError,
+    petsc::{PetscError, Session},
     problem::unresolved,
     scene::Scene,
 };
@@ -57,6 +57,7 @@ pub(super) struct Estimate<'a> {
 
 impl<'a> Estimate<'a> {
     pub(super) fn new(
+        session: &Session,
         mesh: &'a Mesh,
         run: FewStepRun<'a>,
         accuracy: f64,
@@ -68,9 +69,10 @@ impl<'a> Estimate<'a> {
             (point.at, here.sum())
         });
         let singular = singular.collect();
-        let displacement = run.displacement();
+        let (displacement, end) = (run.displacement(), &run.outcome.last.state);
+        let unresolved = unresolved(session, run.problem, end, accuracy, displacement)?;
         Ok(Self {
-            unresolved: unresolved(run.problem.scene(), mesh, accuracy, displacement),
+            unresolved,
             deepest: accuracy * displacement,
             open: run.open() / accuracy,
             singular,

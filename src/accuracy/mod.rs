@@ -251,7 +251,7 @@ impl<'a> AccuracyLoop<'a> {
                 continue;
             }
             // ESTIMATE
-            let estimate = Estimate::new(&refinement.mesh, run, accuracy)?;
+            let estimate = Estimate::new(self.session, &refinement.mesh, run, accuracy)?;
             progress.estimated(&estimate);
             let answer = Answer::new(&estimate.run, refinement.mesh.clone());
             let is_enough = estimate.is_enough();

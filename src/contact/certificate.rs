@@ -89,7 +89,8 @@ impl Certificate {
         Self { nodes, count: self.count }
     }
 
-    /// The residuals of an answer at the nodes `0..owned`, and its gap conditions. Collective.
+    /// The residuals of an answer at the nodes `0..owned`, its gap conditions, and those at nodes whose normal displacement is
+    /// prescribed, without forces. Collective.
     ///
     /// Reactions balance f − Ku at a node: those of prescribed directions its part along them, and those of gap
     /// conditions the part in the cone Σ p ν, p ≥ 0, of their normals. If the normals span the rest of the plane, the
@@ -101,8 +102,8 @@ impl Certificate {
         owned: usize,
         scales: Scales,
         comm: Communicator,
-    ) -> (Kkt, Vec<ContactPoint>) {
-        let mut points = Vec::new();
+    ) -> (Kkt, [Vec<ContactPoint>; 2]) {
+        let mut points = [Vec::new(), Vec::new()];
         let (mut stationarity, mut tangential, mut dual) = (0.0, 0.0, 0.0);
         let (mut primal, mut complementarity) = (0.0_f64, 0.0_f64);
         // Σ |f − Ku|² over nodes without conditions.
@@ -123,10 +124,13 @@ impl Certificate {
                 let counts = force.is_some() || -left > ROUNDING * width;
                 let depth = if !counts || *left >= 0.0 { 0.0 } else { -left };
                 primal = worse(primal, scales.of_displacement(depth));
-                let Some(force) = force else { continue };
-                complementarity = worse(complementarity, scales.natural(force, *left));
+                let is_prescribed = force.is_none();
+                let force = force.unwrap_or(0.0);
+                if !is_prescribed {
+                    complementarity = worse(complementarity, scales.natural(force, *left));
+                }
                 let active = force > 0.0 && force * scales.displacement > left * scales.force;
-                points.push(ContactPoint {
+                points[usize::from(is_prescribed)].push(ContactPoint {
                     node: at.node,
                     normal: gap.direction,
                     force,

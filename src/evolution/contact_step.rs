@@ -178,7 +178,8 @@ impl<'a> ContactStep<'a> {
             self.next.warm_start.clear();
         }
         let (candidate, report) = self.solve_certified(step, &case)?;
-        let Candidate { u, kkt, scales, force, unbalanced, mut contact, .. } = candidate;
+        let Candidate { u, kkt, scales, force, unbalanced, mut contact, prescribed, .. } =
+            candidate;
         self.next.scales = scales;
         let forces = self.accepted.forces.max(candidate.forces);
         self.next.forces = forces;
@@ -191,7 +192,8 @@ impl<'a> ContactStep<'a> {
         self.next.active = active_bounds(&problem.constraints, &contact, limit);
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = self.next.reference.total(u);
-        let state = State { time, u, zeta: zeta.to_vec(), contact };
+        let mut state = State { time, u, zeta: zeta.to_vec(), contact, prescribed };
+        problem.share_reactions(&mut state, &unbalanced, rounding);
         let (observation, figures) = phases
             .time("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
         let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);

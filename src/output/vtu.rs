@@ -202,7 +202,7 @@ fn point_data(
     let mut pressure = vec![0.0_f64; partition.local()];
     let mut gap = vec![f64::NAN; partition.local()];
     pressures.iter().for_each(|(node, value)| pressure[*node] = *value);
-    for point in &state.contact {
+    for point in state.of_contact() {
         gap[point.node] = gap[point.node].min(point.gap);
     }
     partition.update(&mut pressure, 1)?;

@@ -8,7 +8,8 @@
 //! R/2 + L/6 (p_a − p_b),   at least 0 and at most R,
 //!
 //! with the quotients p of the reactions of a and b alone by ∫φ. A pressure that is linear in the arc length keeps its
-//! values. The reaction of a vertex with a prescribed displacement is not of contact: the edge is shared in halves.
+//! values. At a vertex with a prescribed displacement R is the part of the reaction that Γ_C exerts
+//! ([`Supports`](super::Supports)).
 //!
 //! Where boundaries meet smoothly at a node, those with the least gap there share its reaction.
 //!
@@ -177,6 +178,11 @@ impl ContactLine {
         }
     }
 
+    /// Is the node of this rank on Γ_C?
+    pub(super) fn has(&self, node: usize) -> bool {
+        self.places.contains_key(&node)
+    }
+
     /// The line with the places of a rank's nodes, to which `own` gives new numbers.
     pub(super) fn restrict(&self, own: impl Fn(&usize) -> Option<usize>) -> Self {
         let places = self.places.iter().filter_map(|(n, of)| Some((own(n)?, of.clone())));
@@ -222,7 +228,7 @@ impl ContactLine {
     }
 
     /// The reactions at all line nodes in order, on every rank, with those of joints in proportion to lengths. Collective.
-    fn reactions(&self, body: &Body, contact: &[ContactPoint], t: f64) -> Vec<Reaction> {
+    fn reactions(&self, body: &Body, state: &State) -> Vec<Reaction> {
         let reactions = |point: &ContactPoint| {
             let ContactPoint { normal, force, pressure, gap, active, .. } = *point;
             // No -0.
@@ -233,9 +239,9 @@ impl ContactLine {
                 let active = f64::from(u8::from(active && share.force > 0.0));
                 [line_node, nx, ny, gap, share.force * force, share.pressure * pressure, active]
             };
-            self.shares(point, t).into_iter().map(of)
+            self.shares(point, state.time).into_iter().map(of)
         };
-        let own: Vec<Reaction> = contact.iter().flat_map(reactions).collect();
+        let own: Vec<Reaction> = state.of_contact().flat_map(reactions).collect();
         let all = body.nodes.partition.comm().gather(own.as_flattened());
         let mut all: Vec<Reaction> = all.as_chunks().0.to_vec();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -271,13 +277,13 @@ impl ContactLine {
     pub(super) fn moved_forces(
         &self,
         body: &Body,
-        (contact, t): (&[ContactPoint], f64),
+        state: &State,
     ) -> Vec<([usize; 2], [f64; 2], [f64; 2])> {
         let boundaries = |of: &[usize; 2]| of.map(|line_node| self.line_nodes[line_node].boundary);
         if !self.joints.iter().map(boundaries).any(|[a, b]| a != b) {
             return Vec::new();
         }
-        let all = self.reactions(body, contact, t);
+        let all = self.reactions(body, state);
         let of = |(places, force): ([usize; 2], f64)| {
             let [nx, ny] = [1, 2].map(|k| -force * all[places[0]][k]);
             let line_nodes = places.map(|i| &self.line_nodes[all[i][0] as usize]);
@@ -291,7 +297,7 @@ impl ContactLine {
     /// The rows in a state, boundary by boundary and along each, on every rank; and the pressures at this rank's nodes of
     /// Γ_C, Pa. Collective.
     pub fn rows(&self, body: &Body, state: &State) -> (Vec<ContactRow>, Vec<(usize, f64)>) {
-        let mut all = self.reactions(body, &state.contact, state.time);
+        let mut all = self.reactions(body, state);
         for (places, force) in Vec::from_iter(self.moved(&all)) {
             for (i, change) in places.into_iter().zip([-force, force]) {
                 all[i][5] *= 1.0 + change / all[i][4];
@@ -315,18 +321,16 @@ impl ContactLine {
     /// The pressure at each line node, Pa.
     fn pressures(&self, reactions: &[Reaction]) -> Vec<f64> {
         let line_nodes = &self.line_nodes;
-        let (mut forces, mut nodal) = (vec![0.0; line_nodes.len()], vec![None; line_nodes.len()]);
+        let [mut forces, mut nodal] = [vec![0.0; line_nodes.len()], vec![0.0; line_nodes.len()]];
         for &[number, .., force, pressure, _] in reactions {
             forces[number as usize] += force;
-            nodal[number as usize] = Some(pressure);
+            nodal[number as usize] = pressure;
         }
         let middles = || (0..line_nodes.len()).filter(|&i| line_nodes[i].length.is_none());
         let arc = |i: usize| line_nodes[i].row.arc_length;
         for i in middles() {
             let (a, b, length) = (i - 1, i + 1, arc(i + 1) - arc(i - 1));
-            let [p, q] =
-                [nodal[a].or(nodal[b]), nodal[b].or(nodal[a])].map(Option::unwrap_or_default);
-            let share = 0.5 * forces[i] + length / 6.0 * (p - q);
+            let share = 0.5 * forces[i] + length / 6.0 * (nodal[a] - nodal[b]);
             let share = share.clamp(0.0, forces[i]);
             forces[a] += share;
             forces[b] += forces[i] - share;
@@ -350,20 +354,12 @@ impl ContactLine {
     }
 
     /// The length of contact by the `rows` of Γ_C, m, and the nodes on both sides of each of its ends, which lies
-    /// between them. Next to a node without a row, which has a prescribed displacement, contact goes on up to it. At the
-    /// end of Γ_C a light pressure may hide a short open part.
+    /// between them. At the end of Γ_C a light pressure may hide a short open part.
     pub fn length(&self, rows: &[ContactRow]) -> (f64, Vec<[[f64; 2]; 2]>) {
         /// Smaller pressures than this fraction of the largest are light.
         const LIGHT: f64 = 0.05;
         let (mut length, mut ends) = (0.0, Vec::new());
         for part in parts_from_open_nodes(rows) {
-            let [first, .., last] = &part[..] else { continue };
-            let rows = self.line_nodes.iter().map(|line_node| &line_node.row);
-            let is_here =
-                |of: &&ContactRow| (&of.boundary, of.part) == (&first.boundary, first.part);
-            let whole = rows.rev().find(is_here).map(|end| end.arc_length);
-            length += f64::from(first.active) * first.arc_length;
-            length += f64::from(last.active) * whole.map_or(0.0, |all| all - last.arc_length);
             let largest = part.iter().fold(0.0, |most, row| f64::max(most, row.pressure));
             for (i, pair) in part.windows(2).enumerate() {
                 let [a, b] = [&pair[0], &pair[1]];

@@ -14,4 +14,13 @@ pub struct State {
     pub zeta: Vec<f64>,
     /// The nodes of Γ_C that carry a gap condition; two entries at a corner.
     pub contact: Vec<ContactPoint>,
+    /// The nodes of Γ_C whose normal displacement is prescribed, with the part of their reaction that Γ_C exerts.
+    pub prescribed: Vec<ContactPoint>,
+}
+
+impl State {
+    /// The nodes of Γ_C, those with a prescribed normal displacement last.
+    pub(crate) fn of_contact(&self) -> impl Iterator<Item = &ContactPoint> {
+        self.contact.iter().chain(&self.prescribed)
+    }
 }

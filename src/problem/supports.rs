@@ -1,13 +1,18 @@
 //! The boundaries that support the body and the forces they exert.
 
-use super::{ContactLine, State, boundary_conditions::BoundaryConditions};
+use super::{ContactLine, DiscreteProblem, State, boundary_conditions::BoundaryConditions};
 use crate::{
+    ROUNDING,
+    contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
-    mesh::{BoundaryFace, Lines, sorted},
-    scene::{Boundary, Scene},
+    mesh::{BoundaryFace, Lines, extent, sorted},
+    scene::{Boundary, Scene, SurfaceLoad},
 };
 use nalgebra::{Matrix2, Vector2, Vector3};
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    cell::LazyCell,
+    collections::{BTreeMap, BTreeSet},
+};
 
 /// The boundaries with prescribed displacements or a gap, and the nodes of this rank on them.
 #[derive(Debug, Clone, Default)]
@@ -16,8 +21,10 @@ pub struct Supports {
     pub names: Vec<String>,
     /// Per node with a prescribed displacement: its prescribed directions, with the number of the boundary.
     prescribed: BTreeMap<usize, Vec<(usize, [f64; 2])>>,
-    /// Per node at which several boundaries prescribe the displacement: their edges there.
+    /// Per node at which one boundary prescribes the displacement and another one supports the body, too: their edges there.
     edges: BTreeMap<usize, Vec<NodeEdge>>,
+    /// A gap up to this is closed, m.
+    closed: f64,
     /// Γ_C.
     pub contact: ContactLine,
 }
@@ -32,6 +39,8 @@ struct NodeEdge {
     at: [f64; 3],
     /// ν and ∫φ_i.
     face: BoundaryFace,
+    /// The surface loads on it.
+    loads: Vec<SurfaceLoad>,
 }
 
 impl Supports {
@@ -42,7 +51,8 @@ impl Supports {
         conditions: &BoundaryConditions,
         lines: &Lines,
     ) -> Self {
-        let mut supports = Self { names: conditions.supports.clone(), ..Self::default() };
+        let closed = ROUNDING * extent(&body.nodes.points);
+        let mut supports = Self { names: conditions.supports.clone(), closed, ..Self::default() };
         for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
             supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
         }
@@ -60,9 +70,17 @@ impl Supports {
             (!body.materials.is_empty()).then(|| Lines::new(&body.mesh, |t| body.material(t)));
         let between = zones.into_iter().flat_map(|of| of.ends).filter_map(is_between).collect();
         supports.contact = ContactLine::new(contact, &body.nodes.points, lines, &between);
-        let several = |of: &[(usize, [f64; 2])]| of.iter().any(|(number, _)| *number != of[0].0);
-        let shared = supports.prescribed.iter().filter(|(_, of)| several(of));
+        let is_shared = |(node, of): &(&usize, &Vec<(usize, [f64; 2])>)| {
+            supports.contact.has(**node) || of.iter().any(|(number, _)| *number != of[0].0)
+        };
+        let shared = supports.prescribed.iter().filter(is_shared);
         let shared: BTreeSet<usize> = shared.map(|(node, _)| *node).collect();
+        let mut loads = BTreeMap::<[usize; 2], Vec<&SurfaceLoad>>::new();
+        for boundary in &scene.boundaries {
+            let edges = body.mesh.edges_of(&boundary.name).iter();
+            let loaded = edges.flat_map(|edge| boundary.loads().map(|load| (sorted(*edge), load)));
+            loaded.for_each(|(edge, load)| loads.entry(edge).or_default().push(load));
+        }
         let is_shared = |edge: &&[usize; 2]| edge.iter().any(|node| shared.contains(node));
         for (number, name) in supports.names.iter().enumerate() {
             let edges = body.mesh.edges_of(name).iter().filter(is_shared).copied();
@@ -70,9 +88,12 @@ impl Supports {
             let triangles = body.mesh.triangles_at(&edges);
             for edge in body.edges(&edges) {
                 let (triangle, _) = triangles[&sorted(edge.ends)];
+                let loads = loads.get(&sorted(edge.ends)).into_iter().flatten();
+                let loads: Vec<SurfaceLoad> = loads.map(|load| (*load).clone()).collect();
                 for (node, face) in edge.faces(&body.nodes.points, lines) {
                     let at = coordinates(&body.mesh.triangles[triangle], &edge, node);
-                    let of_node = NodeEdge { boundary: number, triangle, at, face };
+                    let loads = loads.clone();
+                    let of_node = NodeEdge { boundary: number, triangle, at, face, loads };
                     supports.edges.entry(node).or_default().push(of_node);
                 }
             }
@@ -96,15 +117,46 @@ impl Supports {
             prescribed: prescribed.filter_map(|(n, of)| Some((own(n)?, of.clone()))).collect(),
             edges: edges.collect(),
             contact: self.contact.restrict(own),
+            closed: self.closed,
         }
+    }
+
+    /// The nodes of Γ_C with a prescribed normal displacement, with the part of their reactions that Γ_C exerts. It presses
+    /// where its gap is closed, and this part is more than `rounding`, N per metre of thickness.
+    fn pressed(
+        &self,
+        body: &Body,
+        state: &State,
+        (unbalanced, rounding): (&[f64], f64),
+        stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
+    ) -> Vec<ContactPoint> {
+        let pressed = |point: &ContactPoint| {
+            let shares = self.contact.shares(point, state.time);
+            let bears = shares.iter().find(|share| share.force > 0.0)?;
+            let number = self.contact.line_nodes[bears.line_node].boundary;
+            let gap = [(number, point.normal)];
+            let directions = [self.prescribed.get(&point.node)?, &gap[..]].concat();
+            let at = (point.node, body.nodes.points[point.node], state.time);
+            let reaction =
+                -Vector2::new(unbalanced[2 * point.node], unbalanced[2 * point.node + 1]);
+            let exerted = self.divided(at, reaction, &directions, &stress);
+            let own = exerted.iter().filter(|(other, _)| *other == number);
+            let normal = Vector2::from(point.normal);
+            let force: f64 = own.map(|(_, force)| -force.dot(&normal)).sum();
+            let edges = self.edges.get(&point.node)?.iter().filter(|of| of.boundary == number);
+            let length: f64 = edges.map(|edge| edge.face.length).sum();
+            let active = point.gap <= self.closed && force > rounding;
+            let [force, pressure] = if active { [force, force / length] } else { [0.0; 2] };
+            Some(ContactPoint { force, pressure, active, ..*point })
+        };
+        state.prescribed.iter().map(|point| pressed(point).unwrap_or(*point)).collect()
     }
 
     /// Per boundary: (F_x, F_y, M), this rank's part, with F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i
     /// about the origin, positive anticlockwise, N.
     ///
-    /// R_i = (Ku − f)_i is the force on the body at node i; `unbalanced` is f − Ku. At a prescribed node with a
-    /// closed gap, the obstacle exerts the normal reaction and the other boundaries exert the rest. `stress` is σ in a
-    /// triangle at barycentric coordinates, Pa.
+    /// R_i = (Ku − f)_i is the force on the body at node i; `unbalanced` is f − Ku. The obstacle exerts the forces of the
+    /// `state`, and the other boundaries exert the rest. `stress` is σ in a triangle at barycentric coordinates, Pa.
     pub(super) fn resultants(
         &self,
         body: &Body,
@@ -112,7 +164,7 @@ impl Supports {
         unbalanced: &[f64],
         stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
     ) -> Vec<[f64; 3]> {
-        let (contact, t) = (&state.contact[..], state.time);
+        let t = state.time;
         let mut sums = vec![[0.0; 3]; self.names.len()];
         let points = &body.nodes.points;
         let mut add = |boundary: usize, [x, y]: [f64; 2], [fx, fy]: [f64; 2]| {
@@ -123,7 +175,7 @@ impl Supports {
         let mut rest: BTreeMap<usize, [f64; 2]> = (self.prescribed.keys())
             .map(|&node| (node, [-unbalanced[2 * node], -unbalanced[2 * node + 1]]))
             .collect();
-        for point in contact {
+        for point in state.of_contact() {
             let force = point.normal.map(|n| -point.force * n);
             for share in self.contact.shares(point, t) {
                 let boundary = self.contact.line_nodes[share.line_node].boundary;
@@ -133,12 +185,13 @@ impl Supports {
                 (*x, *y) = (*x - force[0], *y - force[1]);
             }
         }
-        for ([from, to], at, force) in self.contact.moved_forces(body, (contact, t)) {
+        for ([from, to], at, force) in self.contact.moved_forces(body, state) {
             add(from, at, force.map(|f| -f));
             add(to, at, force);
         }
         for (node, force) in rest {
-            let exerted = self.divided(node, force.into(), &stress);
+            let at = (node, points[node], t);
+            let exerted = self.divided(at, force.into(), &self.prescribed[&node], &stress);
             exerted
                 .into_iter()
                 .for_each(|(boundary, force)| add(boundary, points[node], force.into()));
@@ -146,28 +199,33 @@ impl Supports {
         sums
     }
 
-    /// Divides the force F at a node, N/m, between the boundaries that prescribe its displacement.
+    /// Divides the force F at a node, N/m, between the boundaries that support it in these `directions`. The node has the place
+    /// x, m, at the time t.
     ///
-    /// The tractions of a boundary B on its edges there have the part R_B = P_B ∫φ σν, with the projection P_B on the
-    /// directions that it prescribes. Its length ℓ_B = ∫φ takes a share in the rest: B exerts R_B + ℓ_B P_B λ, where
-    /// (Σ ℓ_B P_B) λ = F − Σ R_B.
+    /// The tractions of a boundary B on its edges there have the part R_B = P_B ∫φ (σν − f_N), with the projection P_B on the
+    /// directions in which it supports the node, and its loads f_N. Its length ℓ_B = ∫φ takes a share in the rest: B exerts
+    /// R_B + ℓ_B P_B λ, where (Σ ℓ_B P_B) λ = F − Σ R_B.
     fn divided(
         &self,
-        node: usize,
+        (node, x, t): (usize, [f64; 2], f64),
         force: Vector2<f64>,
+        directions: &[(usize, [f64; 2])],
         stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
     ) -> Vec<(usize, Vector2<f64>)> {
-        let prescribed = &self.prescribed[&node];
-        let Some(edges) = self.edges.get(&node) else { return vec![(prescribed[0].0, force)] };
-        let numbers: BTreeSet<usize> = prescribed.iter().map(|(number, _)| *number).collect();
+        let numbers: BTreeSet<usize> = directions.iter().map(|(number, _)| *number).collect();
+        let Some(edges) = self.edges.get(&node).filter(|_| numbers.len() > 1) else {
+            return vec![(directions[0].0, force)];
+        };
         let part = |number: usize| {
             let own = edges.iter().filter(|edge| edge.boundary == number);
-            let traction = own.clone().map(|NodeEdge { triangle, at, face, .. }| {
+            let traction = own.clone().map(|NodeEdge { triangle, at, face, loads, .. }| {
                 let [xx, yy, xy] = stress(*triangle, *at).into();
-                Matrix2::new(xx, xy, xy, yy) * Vector2::from(face.normal) * face.length
+                let loads = loads.iter().map(|load| Vector2::from(load.at(x, face.normal, t)));
+                let internal = Matrix2::new(xx, xy, xy, yy) * Vector2::from(face.normal);
+                (internal - loads.sum::<Vector2<f64>>()) * face.length
             });
             let length: f64 = own.map(|edge| edge.face.length).sum();
-            let directions = prescribed.iter().filter(|(other, _)| *other == number);
+            let directions = directions.iter().filter(|(other, _)| *other == number);
             let onto = projection(directions.map(|(_, direction)| Vector2::from(*direction)));
             (number, onto * traction.sum::<Vector2<f64>>(), length * onto)
         };
@@ -183,6 +241,22 @@ impl Supports {
         let all = exerted.iter().map(|(_, own)| own).sum::<Vector2<f64>>();
         exerted[0].1 += force - all;
         exerted
+    }
+}
+
+impl DiscreteProblem {
+    /// σ of a state in a triangle at barycentric coordinates, Pa.
+    pub(super) fn stress_in(&self, state: &State) -> impl Fn(usize, [f64; 3]) -> Vector3<f64> {
+        let zeta = LazyCell::new(|| self.zeta_at_points(&state.zeta));
+        move |t, at| self.elasticity.stress_at(&self.body, (t, at), &zeta, &state.u)
+    }
+
+    /// Sets the forces of Γ_C at the nodes of a state with a prescribed normal displacement. `unbalanced` is f − Ku. Forces up
+    /// to `rounding`, N per metre of thickness, are zero.
+    pub(crate) fn share_reactions(&self, state: &mut State, unbalanced: &[f64], rounding: f64) {
+        let (body, reactions) = (&self.body, (unbalanced, rounding));
+        let pressed = self.supports.pressed(body, state, reactions, self.stress_in(state));
+        state.prescribed = pressed;
     }
 }
 

@@ -136,3 +136,60 @@ fn adaptive_steps_are_no_error_of_the_mesh() {
         assert!(worst < 1e-6, "{cycles} cycles, {accuracy}: {worst}");
     }
 }
+
+/// A square whose damage only diffuses, with κt = 0.1.
+fn diffusing(initial: &str, more: &str) -> Scene {
+    scene(&format!(
+        "accuracy = 0.03
+         material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+         damage = {{ diffusion = 0.1, lambda_d = 0, lambda_u = 0, lambda_w = 0, initial = '{initial}' }}
+         time = {{ end = 1, step = 'auto' }}
+         {more}
+         boundary = [
+            {{ name = 'left', symmetry = true }},
+            {{ name = 'bottom', gap = 0 }},
+            {{ name = 'top', traction = [0, -1] }},
+         ]"
+    ))
+}
+
+/// Damage that is uniform up to rounding needs no finer mesh, whatever its expression is.
+#[test]
+fn an_initial_damage_that_varies_by_rounding_is_no_reason_to_refine() {
+    for initial in
+        ["1 - d0*x", "1 - d0*if(x < 0.43, 1, 0)", "0.7 + d0*sin(50*x)", "0.7 + 0.1*d0*(x - x*y)"]
+    {
+        for d0 in ["0", "1e-15"] {
+            let scene = diffusing(initial, &format!("constants = {{ d0 = {d0} }}"));
+            let found = adapted(&scene, square(3), 0.03);
+            assert!(found.not_reached.is_none(), "{initial}: {:?}", found.not_reached);
+            assert_eq!((found.rounds, found.mesh.triangles.len()), (1, 18), "{initial}, {d0}");
+        }
+    }
+}
+
+/// ∫(1 − ζ) stays as it is. A mesh whose nodes miss a part of it is refined as far as this part counts at the end, after
+/// its diffusion: a jump needs few meshes, and a spot that is far narrower than the first triangles is found.
+#[test]
+fn initial_damage_that_the_first_triangles_miss_counts_by_what_is_left_of_it() {
+    const PI: f64 = std::f64::consts::PI;
+    for (initial, exact, most) in [
+        ("if(x < 0.43, 0.7, 1)", 0.3 * 0.43, 4),
+        ("if(x + 0.3*y < 0.5, 0.5, 1)", 0.5 * (0.5 - 0.15), 4),
+        ("if((x - 0.37)^2 + (y - 0.52)^2 < 0.04, 0.6, 1)", 0.4 * 0.04 * PI, 6),
+        ("1 - 0.9*exp(-((x - 0.513)^2 + (y - 0.487)^2)/0.0004)", 0.9 * 0.0004 * PI, 10),
+        ("if(abs(x - 0.513) < 0.004, 0.4, 1)", 0.6 * 0.008, 10),
+    ] {
+        let scene = diffusing(initial, "");
+        let Adapted { mesh, rounds, not_reached, measured, .. } =
+            adapted(&scene, crate::support::unstructured(0.2), 0.03);
+        assert!(not_reached.is_none(), "{initial}: {not_reached:?}");
+        assert!(rounds <= most, "{initial}: mesh {rounds}");
+        let bar = measured.bars.iter().find(|bar| bar.name == "zeta_mean").unwrap().bar;
+        let triangles = mesh.triangles.len();
+        let found = 1.0 - solved(scene, mesh).last.record.zeta_mean;
+        println!("{initial}: mesh {rounds}, {triangles} triangles, {found} ± {bar}, {exact}");
+        assert!((found - exact).abs() <= bar, "{initial}: {found} ± {bar} is not {exact}");
+        assert!((found - exact).abs() <= 0.03 * exact, "{initial}: {found} is not {exact}");
+    }
+}

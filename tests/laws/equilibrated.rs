@@ -3,7 +3,7 @@
 //! The true error is that against the answer of second order on the mesh bisected twice, with the same ζ. The study
 //! `validation/bounds.py` has many more scenes.
 
-use crate::support::{ORDERS, distorted, layered, problem, square, unstructured};
+use crate::support::{ORDERS, distorted, layered, moved, problem, square, turn, unstructured};
 use nalgebra::{DMatrix, DVector, Vector3};
 use signorini::{
     estimate::{EquilibratedStress, Simulation},
@@ -175,6 +175,39 @@ fn it_is_above_the_error_with_contact() {
          ]
          body = { force = [0, '-0.3'] }";
     bounds(distorted(5), loose, 4.0);
+}
+
+#[test]
+fn it_is_above_the_error_where_a_clamped_end_of_a_foundation_has_an_open_gap() {
+    // Γ_C begins or ends at a clamp that keeps its node away from the obstacle, also by a displacement of its own.
+    for angle in [0.0_f64, 0.4, 2.0] {
+        let [c, s] = turn(angle, [1.0, 0.0]);
+        let x = format!("({c}*x + {s}*y)");
+        let load = turn(angle, [0.0, -0.01]);
+        let rise = turn(angle, [0.0, 0.2]);
+        for (clamp, gap) in [
+            ("[0, 0]".to_owned(), format!("1 - {x}")),
+            ("[0, 0]".to_owned(), format!("0.1*(1 - {x})")),
+            (format!("{rise:?}"), format!("0.3*(1 - {x})")),
+            (format!("{rise:?}"), "0".to_owned()),
+        ] {
+            for (mesh, other) in [(square(1), ""), (square(2), ""), (distorted(3), "right")] {
+                let other = match other {
+                    "" => String::new(),
+                    name => format!("{{ name = '{name}', displacement = {clamp} }},"),
+                };
+                let text = format!(
+                    "material = {{ young = 1, poisson = 0.3, plane = 'stress' }}
+                     boundary = [
+                        {{ name = 'left', displacement = {clamp} }}, {other}
+                        {{ name = 'bottom', gap = '{gap}' }},
+                        {{ name = 'top', traction = {load:?} }},
+                     ]"
+                );
+                bounds(moved(mesh, |x| turn(angle, x)), &text, 6.0);
+            }
+        }
+    }
 }
 
 #[test]

@@ -239,8 +239,10 @@ fn an_affine_pressure_is_exact_at_the_vertices_and_midpoints_of_any_foundation()
                     let [x, _] = turn(-angle, points[point.node]);
                     close_relative(point.pressure, p + c * x, 1e-9);
                 }
-                // The edge at the clamped corner, where Γ_D has a part of the reaction, is shared in halves.
-                for row in &problem.supports.contact.rows(&problem.body, &state).0[3..] {
+                // The node at the clamped corner has a row, too: Γ_C has a part of the reaction there.
+                let rows = problem.supports.contact.rows(&problem.body, &state).0;
+                assert_eq!(rows.len(), state.contact.len() + 1);
+                for row in rows {
                     let [x, _] = turn(-angle, [row.x, row.y]);
                     close_relative(row.pressure, p + c * x, 1e-9);
                 }

@@ -218,3 +218,204 @@ fn a_load_along_a_curve_balances_within_the_error_of_its_edges() {
         }
     }
 }
+
+/// A square, turned by an angle, with u = a + (ε + ω) x on the sides of the corner at the origin: what `left` prescribes by
+/// component, the gap of `bottom` beyond u·ν with its normal, if that is fixed, and σ in the turned axes.
+struct Corner {
+    stress: [f64; 3],
+    left: [bool; 2],
+    open: f64,
+    normal: Option<[f64; 2]>,
+    load: f64,
+}
+
+/// Young's modulus and Poisson's ratio of these squares.
+const YOUNG: f64 = 1000.0;
+const POISSON: f64 = 0.3;
+
+impl Corner {
+    /// Clamped, with a closed gap.
+    fn of(stress: [f64; 3]) -> Self {
+        Self { stress, left: [true; 2], open: 0.0, normal: None, load: 0.0 }
+    }
+
+    /// The scene at an angle, with `more` of its tables, for lengths and forces in units that are `units` times as small.
+    fn text(&self, angle: f64, zeta: f64, [length, force]: [f64; 2], more: &str) -> String {
+        let [xx, yy, xy] = self.stress;
+        let young = YOUNG * zeta;
+        let turned = |v: [f64; 2]| turn(angle, v);
+        let ([c, s], stress_unit) = (turned([1.0, 0.0]), force / length);
+        // x and y in the axes of the square, m.
+        let [x, y] = [format!("({c}*x + {s}*y)"), format!("({c}*y - {s}*x)")];
+        let [of_x, of_y] = [
+            [(xx - POISSON * yy) / young, (1.0 + POISSON) * xy / young - 2e-3],
+            [(1.0 + POISSON) * xy / young + 2e-3, (yy - POISSON * xx) / young],
+        ];
+        // u in the turned axes, and as components.
+        let along = |[a, b]: [f64; 2], shift: f64| format!("({shift} + {a}*{x} + {b}*{y})");
+        let moved = [along(of_x, 0.01 * length), along(of_y, -0.02 * length)];
+        let u = |k: usize| {
+            let [p, q] = [turned([1.0, 0.0])[k], turned([0.0, 1.0])[k]];
+            format!("{p}*{} + {q}*{}", moved[0], moved[1])
+        };
+        let component = |k: usize| match self.left[k] {
+            true => format!("'t*({})'", u(k)),
+            false => "'free'".to_owned(),
+        };
+        let normal = self.normal.unwrap_or([0.0, -1.0]);
+        let size = normal[0].hypot(normal[1]);
+        let gap = format!(
+            "t*({}*{} + {}*{}) + {}",
+            normal[0] / size,
+            moved[0],
+            normal[1] / size,
+            moved[1],
+            self.open * length
+        );
+        let fixed = turned(normal);
+        let fixed = self.normal.map_or(String::new(), |_| format!(", normal = {fixed:?}"));
+        let traction = |v: [f64; 2]| turned(v).map(|f| f * stress_unit);
+        let load = traction([0.0, self.load]);
+        format!(
+            "{more}
+             material = {{ young = {}, poisson = {POISSON}, plane = 'stress' }}
+             boundary = [{{ name = 'left', displacement = [{}, {}] }},
+                         {{ name = 'bottom', gap = '{gap}'{fixed}, traction = {load:?} }},
+                         {{ name = 'right', traction = {:?} }},
+                         {{ name = 'top', traction = {:?} }}]",
+            YOUNG * stress_unit,
+            component(0),
+            component(1),
+            traction([xx, xy]),
+            traction([xy, yy]),
+        )
+        .replace("+ -", "- ")
+    }
+}
+
+#[test]
+fn a_clamp_and_a_foundation_with_a_common_node_exert_their_tractions_in_a_patch() {
+    let corners = [
+        // A pressure alone, with a tension along the foundation, with shear on an obstacle with a fixed normal, and under a load.
+        Corner::of([0.0, -1.0, 0.0]),
+        Corner::of([3.0, -2.0, 0.0]),
+        Corner { normal: Some([0.4, -1.0]), ..Corner::of([3.0, -2.0, 0.8]) },
+        Corner { load: 0.5, ..Corner::of([-1.0, -2.0, 0.0]) },
+        Corner { load: -0.5, ..Corner::of([-1.0, -2.0, 0.0]) },
+        // Nothing presses: the gap is open, or the foundation is free of stress.
+        Corner { open: 0.01, ..Corner::of([3.0, 0.0, 0.0]) },
+        Corner { open: 0.01, load: 0.7, ..Corner::of([3.0, -0.7, 0.0]) },
+        Corner::of([3.0, 0.0, 0.0]),
+        // One component across the foundation.
+        Corner { left: [false, true], ..Corner::of([0.0, -1.0, 0.0]) },
+    ];
+    let damaged = "damage = { diffusion = 1, initial = 0.5 }";
+    for order in ORDERS {
+        for (k, corner) in corners.iter().enumerate() {
+            let cases = [(0.0, 1.0, [1.0, 1.0], ""), (0.0, 0.5, [1e-3, 1e6], damaged)];
+            let turned = [(0.7, 1.0, [1e3, 1e-4], ""), (2.0, 1.0, [1.0, 1.0], "")];
+            // At other angles a component is no direction of the square.
+            let turned = turned.into_iter().filter(|_| corner.left == [true; 2]);
+            for (angle, zeta, units, more) in cases.into_iter().chain(turned) {
+                for mesh in [square(2), distorted(4), unstructured(0.3)] {
+                    let [length, force] = units;
+                    let degree = format!("discretisation.displacement = {}", 1 + order as u8);
+                    let more = format!("contact.tolerance = 1e-12\n{degree}\n{more}");
+                    let text = corner.text(angle, zeta, units, &more);
+                    let mesh =
+                        moved(mesh, |x| turn(angle, x.map(|coordinate| length * coordinate)));
+                    let problem =
+                        problem(mesh, &text).unwrap_or_else(|e| panic!("{k}: {e}\n{text}"));
+                    let last = run(&problem, SOLVERS[0]).last;
+                    let found = support::figures(&problem, &last);
+                    let resultant = |of: &str| {
+                        let of =
+                            ["x", "y"].map(|axis| found[&format!("{of}.force_{axis}")] / force);
+                        turn(-angle, of)
+                    };
+                    let [xx, yy, xy] = corner.stress;
+                    let expected = [("left", [-xx, -xy]), ("bottom", [-xy, -yy - corner.load])];
+                    for (name, expected) in expected {
+                        let found = resultant(name);
+                        let error = [0, 1].map(|i| (found[i] - expected[i]).abs());
+                        assert!(
+                            error.iter().all(|error| *error < 2e-8),
+                            "P{} corner {k} at {angle}: {name} {found:?}, not {expected:?}\n{text}",
+                            1 + order as u8
+                        );
+                    }
+                    let pressure = xy.hypot(yy + corner.load);
+                    close(found["contact_force"] / force, pressure, 1e-8);
+                    let pressed = f64::from(u8::from(pressure > 0.0));
+                    close(found["contact_length"] / length, pressed, 1e-9);
+                    // Γ_C has a row at the corner, too. The nodes of the contact problem are the others.
+                    let rows = problem.supports.contact.rows(&problem.body, &last.state).0;
+                    assert_eq!(rows.len(), last.state.contact.len() + 1);
+                    for row in rows {
+                        close(row.pressure * length / force, pressure, 1e-7);
+                        assert!((row.gap / length - corner.open).abs() < 1e-9, "{row:?}");
+                        assert_eq!(f64::from(row.active), pressed);
+                    }
+                    let active = last.state.contact.iter().filter(|point| point.active).count();
+                    assert_eq!(last.record.active_nodes, active);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_clamp_and_a_foundation_balance_the_loads_and_no_foundation_pulls() {
+    // Stress of degree 0 or singular at the corner: pressed, pulled, sheared, with a gap that is closed there alone.
+    for order in ORDERS {
+        for (gap, load) in [
+            ("0", "[0.3, -1]"),
+            ("0", "[0.3, 1]"),
+            ("0", "[-2, 0]"),
+            ("0.001*x", "[0, -1]"),
+            ("0.001*(1 - x)", "[0.5, -1]"),
+        ] {
+            for mesh in [square(3), unstructured(0.2)] {
+                let text = format!(
+                    "boundary = [{{ name = 'left', displacement = [0, 0] }},
+                     {{ name = 'bottom', gap = '{gap}' }}, {{ name = 'right', traction = {load} }}]"
+                );
+                let problem = of_order(mesh, order, &text).unwrap();
+                let last = run(&problem, SOLVERS[0]).last;
+                let found = support::figures(&problem, &last);
+                let sum =
+                    |axis: &str| found[&format!("left.{axis}")] + found[&format!("bottom.{axis}")];
+                let load: Vec<f64> =
+                    load[1..load.len() - 1].split(", ").map(|f| f.parse().unwrap()).collect();
+                // The moment of the load at (1, ½) is F_y − F_x/2.
+                close(sum("force_x"), -load[0], 1e-8);
+                close(sum("force_y"), -load[1], 1e-8);
+                close(sum("moment"), 0.5 * load[0] - load[1], 1e-8);
+                close(found["contact_force"], found["bottom.force_y"], 1e-9);
+                let rows = problem.supports.contact.rows(&problem.body, &last.state).0;
+                assert!(rows.iter().all(|row| row.force >= 0.0 && row.pressure >= 0.0));
+                let area: f64 = (rows.windows(2))
+                    .map(|p| 0.5 * (p[0].pressure + p[1].pressure) * (p[1].x - p[0].x))
+                    .sum();
+                close(area, found["bottom.force_y"], 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_patch_with_a_clamp_beside_a_foundation_needs_no_finer_mesh() {
+    for order in 1..=2 {
+        let text = format!(
+            "accuracy = 0.01\ndiscretisation.displacement = {order}
+             material = {{ young = 1000, poisson = 0, plane = 'stress' }}
+             boundary = [{{ name = 'left', displacement = [0, '-0.001*y'] }},
+                         {{ name = 'bottom', gap = 0 }}, {{ name = 'top', traction = [0, -1] }}]"
+        );
+        let (scene, mesh) = (scene(&text), unstructured(0.4));
+        let triangles = mesh.triangles.len();
+        let found = adapted(&scene, mesh, 0.01);
+        assert!(found.not_reached.is_none() && found.rounds == 1, "{:?}", found.not_reached);
+        assert_eq!(found.mesh.triangles.len(), triangles);
+    }
+}

@@ -2,7 +2,6 @@
 //!
 //! On an edge p = p_a (1 − s)² + 2c s (1 − s) + p_b s², with c = (p_a + p_b)/2 for elements of first order. All coefficients are at
 //! least 0. Of these pressures, p is nearest in L² to the one with the reactions of the nodes. It acts along −ν of the nodes.
-//! Next to a node with a prescribed displacement, which has no row, it is constant.
 
 use super::Side;
 use crate::{
@@ -39,8 +38,6 @@ pub(super) struct ContactEdge {
     length: f64,
     /// Differs ν at an end from the normal of the edge, as where Γ_C is curved?
     pub(super) is_turned: bool,
-    /// Has the contact rows at both ends?
-    has_rows: [bool; 2],
     /// Is it this rank that counts the edge? The rank of the end with the smaller global number does.
     is_own: bool,
 }
@@ -53,7 +50,8 @@ pub(super) struct Foundation {
 
 /// The rows at the ends of an edge and in its middle, and its length, m.
 struct Piece {
-    rows: [Option<usize>; 3],
+    ends: [usize; 2],
+    middle: Option<usize>,
     length: f64,
 }
 
@@ -94,34 +92,29 @@ impl Foundation {
         // A place between two edges with different pressures has two rows, and so has the start of a closed part.
         let piece = |[a, b]: [[f64; 2]; 2]| {
             let pairs = at(a).iter().flat_map(|i| at(b).iter().map(move |j| [*i, *j]));
-            let pair = pairs.filter(|[i, j]| i < j).min_by_key(|[i, j]| j - i);
-            let [first, last] = pair.map_or_else(
-                || [at(a).last().copied(), at(b).first().copied()],
-                |pair| pair.map(Some),
-            );
+            let ends = pairs.filter(|[i, j]| i < j).min_by_key(|[i, j]| j - i)?;
             let middle = [0, 1].map(|k| 0.5 * (a[k] + b[k]));
             let length = (a[0] - b[0]).hypot(a[1] - b[1]);
-            Piece { rows: [first, at(middle).first().copied(), last], length }
+            Some(Piece { ends, middle: at(middle).first().copied(), length })
         };
         let ends = |edge: &[usize; 2]| edge.map(|vertex| mesh.nodes[vertex]);
-        let undivided = mesh.edges_of(name).iter().map(|edge| piece(ends(edge)));
+        let undivided = mesh.edges_of(name).iter().filter_map(|edge| piece(ends(edge)));
         let pressures = nearest(rows, &Vec::from_iter(undivided));
         let (own, vertices) = (&body.mesh, body.node_of_vertex());
         let edges = own.edges_of(name).iter().filter_map(|edge| {
             let nodes = edge.map(|vertex| vertices[vertex]);
             let side = sides.get(&[nodes[0].min(nodes[1]), nodes[0].max(nodes[1])])?;
-            let piece = piece(edge.map(|vertex| own.nodes[vertex]));
+            let piece = piece(edge.map(|vertex| own.nodes[vertex]))?;
             let outward = normal.map_or(side.1, Vector2::from);
             Some(ContactEdge::new(problem, (rows, &pressures), &piece, nodes, (side.0[2], outward)))
         });
         let edges = Vec::from_iter(edges);
-        // The first rank counts the rows, and each rank the reactions of its nodes without a row.
+        // The first rank counts the rows.
         let is_first = body.nodes.partition.comm().is_root();
         let force = |row: &ContactRow| {
             ([row.x, row.y], -row.force * Vector2::new(row.normal_x, row.normal_y))
         };
-        let of_rows = rows.iter().filter(|_| is_first).map(force);
-        let reactions = of_rows.chain(edges.iter().flat_map(ContactEdge::without_rows)).collect();
+        let reactions = rows.iter().filter(|_| is_first).map(force).collect();
         Self { edges, reactions }
     }
 }
@@ -132,26 +125,22 @@ fn nearest(rows: &[ContactRow], pieces: &[Piece]) -> Vec<f64> {
     const SWEEPS: usize = 60;
     let mut forces: Vec<f64> = rows.iter().map(|row| row.force).collect();
     let (mut diagonal, mut couplings) = (vec![0.0; rows.len()], vec![Vec::new(); rows.len()]);
-    for Piece { rows: of, length } in pieces {
+    for Piece { ends, middle, length } in pieces {
         let linear = [[1.0 / 3.0, 0.0, 1.0 / 6.0], [0.0; 3], [1.0 / 6.0, 0.0, 1.0 / 3.0]];
-        let products = if of[1].is_some() { PRODUCTS } else { linear };
-        if let Some(middle) = of[1] {
+        let products = if middle.is_some() { PRODUCTS } else { linear };
+        if let Some(middle) = *middle {
             // (1 − s)² = φ_a + φ_m/4, 2s(1 − s) = φ_m/2.
             let force = rows[middle].force;
-            of.iter().step_by(2).flatten().for_each(|end| forces[*end] += 0.25 * force);
+            ends.iter().for_each(|end| forces[*end] += 0.25 * force);
             forces[middle] = 0.5 * force;
         }
+        let of = [Some(ends[0]), *middle, Some(ends[1])];
         for (i, row) in of.iter().enumerate() {
             let Some(row) = *row else { continue };
-            for (j, other) in of.iter().enumerate() {
-                // An end without a row has the pressure of the other end.
-                let other = other.or(if j == 1 { None } else { of[2 - j] });
-                match other {
-                    Some(other) if other == row => diagonal[row] += length * products[i][j],
-                    Some(other) => couplings[row].push((other, length * products[i][j])),
-                    None => {}
-                }
-            }
+            diagonal[row] += length * products[i][i];
+            let others = of.iter().enumerate().filter(|(j, _)| *j != i);
+            let others = others.filter_map(|(j, other)| Some(((*other)?, length * products[i][j])));
+            couplings[row].extend(others);
         }
     }
     let mut pressures = vec![0.0_f64; rows.len()];
@@ -178,13 +167,9 @@ impl ContactEdge {
         /// Normals at a larger angle, rad, differ.
         const TURNED: f64 = 1e-6;
         let (partition, points) = (&problem.body.nodes.partition, &problem.body.nodes.points);
-        let [first, middle, last] = piece.rows;
-        let ends = [first.or(last), last.or(first)];
-        let of_end = |k: usize| ends[k].map_or(0.0, |row| pressures[row]);
-        let normal = |row: Option<usize>| {
-            row.map_or(outward, |row| Vector2::new(rows[row].normal_x, rows[row].normal_y))
-        };
-        let gap = |row: Option<usize>| row.map_or(0.0, |row| rows[row].gap.max(0.0));
+        let Piece { ends: [first, last], middle, length } = *piece;
+        let normal = |row: usize| Vector2::new(rows[row].normal_x, rows[row].normal_y);
+        let gap = |row: usize| rows[row].gap.max(0.0);
         let (a, b) = (gap(first), gap(last));
         let mean = 0.5 * (a + b);
         let [from, to] = [start, end].map(|node| points[node]);
@@ -193,22 +178,17 @@ impl ContactEdge {
         Self {
             nodes: [Some(start), middle_node, Some(end)],
             places: [from, [0, 1].map(|k| 0.5 * (from[k] + to[k])), to],
-            normals: [normal(ends[0]), normal(middle.or(ends[0])), normal(ends[1])],
-            pressures: [of_end(0), middle.map_or(0.0, |row| pressures[row]), of_end(1)],
-            gaps: [a, middle.map_or(mean, |row| 2.0 * gap(Some(row)) - mean), b],
-            length: piece.length,
-            is_turned: ends.iter().any(|end| (normal(*end) - outward).norm() > TURNED),
-            has_rows: [first, last].map(|row| row.is_some()),
+            normals: [first, middle.unwrap_or(first), last].map(normal),
+            pressures: [
+                pressures[first],
+                middle.map_or(0.0, |row| pressures[row]),
+                pressures[last],
+            ],
+            gaps: [a, middle.map_or(mean, |row| 2.0 * gap(row) - mean), b],
+            length,
+            is_turned: [first, last].iter().any(|end| (normal(*end) - outward).norm() > TURNED),
             is_own: owner.is_some_and(|node| node < partition.owned()),
         }
-    }
-
-    /// The forces of the pressure at ends without a row, whose reactions are not of contact: p ∫φ.
-    fn without_rows(&self) -> impl Iterator<Item = ([f64; 2], Vector2<f64>)> {
-        let part = self.length * if self.nodes[1].is_some() { 1.0 / 6.0 } else { 0.5 };
-        let force = move |k: usize| (self.places[k], -part * self.pressures[k] * self.normals[k]);
-        let missing = [0, 2].into_iter().zip(self.has_rows).filter(|(_, has_row)| !has_row);
-        missing.filter(|_| self.is_own).map(move |(k, _)| force(k))
     }
 
     /// ∫ of the function of the coefficient k times 1 − s, s, and 4s(1 − s), m.

@@ -32,6 +32,8 @@ pub(super) struct Candidate {
     /// f − Ku, N per metre of thickness.
     pub(super) unbalanced: Vec<f64>,
     pub(super) contact: Vec<ContactPoint>,
+    /// The nodes of Γ_C whose normal displacement is prescribed, without forces.
+    pub(super) prescribed: Vec<ContactPoint>,
     /// The rigid part of u; max |·| of this part and of the rest, m.
     pub(super) rigid: RigidMotion,
     pub(super) rigid_max: f64,
@@ -79,7 +81,7 @@ impl ContactStep<'_> {
             values: &case.values,
         };
         let comm = partition.comm();
-        let (mut kkt, contact) =
+        let (mut kkt, [contact, prescribed]) =
             problem.certificate.residuals(answer, partition.owned(), scales, comm);
         if !self.covered {
             kkt.stationarity = f64::NAN;
@@ -94,6 +96,7 @@ impl ContactStep<'_> {
             energy,
             unbalanced,
             contact,
+            prescribed,
             rigid,
             rigid_max,
             elastic_max,

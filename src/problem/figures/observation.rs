@@ -8,8 +8,6 @@ use crate::{
         Strained, rows_of,
     },
 };
-use std::cell::LazyCell;
-
 /// The quantities from which figures take their values. The state is that of this rank; all other quantities are sums or extremes
 /// over the ranks.
 pub(crate) struct Observation<'a> {
@@ -72,9 +70,7 @@ impl<'a> Observation<'a> {
     ) -> Result<Self, PetscError> {
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let comm = partition.comm();
-        let zeta = LazyCell::new(|| problem.zeta_at_points(&state.zeta));
-        let stress =
-            |t: usize, at: [f64; 3]| problem.elasticity.stress_at(body, (t, at), &zeta, &state.u);
+        let stress = problem.stress_in(state);
         let mut resultants = problem.supports.resultants(body, state, unbalanced, stress);
         comm.sum(resultants.as_flattened_mut());
         let mut probes = problem.probes.values(problem, state);
@@ -88,7 +84,7 @@ impl<'a> Observation<'a> {
             state.zeta.iter().zip(&body.mesh.nodes).take(body.vertices.partition.owned());
         let least = greatest(comm, vertices.map(|(zeta, at)| (-zeta, *at)));
         let strained = NodalStress::strained(problem, &problem.strained(state));
-        let active = state.contact.iter().filter(|point| point.active);
+        let active = state.of_contact().filter(|point| point.active);
         Ok(Self {
             problem,
             state,
