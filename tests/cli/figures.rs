@@ -75,11 +75,7 @@ fn commands_of_python_in_odd_surroundings() {
         let said = said.expect("the program starts");
         assert_eq!(said.status.code(), Some(2), "{said:?}");
         let err = String::from_utf8_lossy(&said.stderr);
-        assert_eq!(
-            err.trim_end(),
-            "error: standard output: No space left on device",
-            "{command}"
-        );
+        assert_eq!(err.trim_end(), "error: standard output: No space left on device", "{command}");
     }
 }
 
