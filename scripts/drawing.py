@@ -4,6 +4,7 @@ import os
 import resource
 import sys
 import textwrap
+import warnings
 from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
@@ -39,6 +40,8 @@ if LIMIT != resource.RLIM_INFINITY:
 
 INK, FAINT, BLUE, RED, GREEN = "#22262b", "#9aa3ad", "#2f6db3", "#c0392b", "#3d8f5a"
 
+# The font may lack letters of a name.
+warnings.filterwarnings("ignore", "Glyph")
 plt.rcParams.update({
     "figure.dpi": 160,
     "font.size": 10,

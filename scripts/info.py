@@ -36,9 +36,10 @@ def entry(name, value, errors):
         # Others than notes are for figures.
         words = [word for word in value if isinstance(word, str)]
         return [row(name, " ".join(words))] if name.endswith("command") else [row(name, word) for word in words]
+    if value is None:
+        return []
     bar = errors.get(name)
-    text = value if isinstance(value, str) else bar and barred(value, bar) or json.dumps(value)
-    return [] if value is None else [row(name, text)]
+    return [row(name, value if isinstance(value, str) else bar and barred(value, bar) or json.dumps(value))]
 
 
 def description(folder):
@@ -50,7 +51,10 @@ def description(folder):
         frames = re.findall('timestep="(.*?)".*?file="(.*?)"', (folder / "fields.pvd").read_text(encoding="utf-8"))
     times = [time for time, file in frames if (folder / file).exists()]
     if len(frames) > 1 and times:
-        first, last = (f"{float(time):.10g}" for time in (times[0], times[-1]))
+        try:
+            first, last = (f"{float(time):.10g}" for time in (times[0], times[-1]))
+        except ValueError:
+            raise ValueError(f"{folder / 'fields.pvd'}: it is damaged or cut off; run the scene again") from None
         gone = f" ({len(frames) - len(times)} more are gone)" if len(times) < len(frames) else ""
         lines.append(row("frames", f"{len(times)}, from t = {first} to {last}{gone}"))
     names = sorted(path.name for path in folder.iterdir())

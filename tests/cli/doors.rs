@@ -72,9 +72,9 @@ fn hostile() -> TestDirectory {
 #[test]
 fn a_folder_full_of_modules_and_settings_of_strangers() {
     let directory = hostile();
-    let module = std::process::Command::new("/usr/bin/python3").args(["-c", "import json"]);
-    let _ = { module }.current_dir(directory.path(".")).output();
-    if directory.path("out").exists() || fs::remove_file(directory.path(MARK)).is_err() {
+    let mut module = std::process::Command::new("/usr/bin/python3");
+    let _ = module.args(["-c", "import json"]).current_dir(directory.path(".")).output();
+    if fs::remove_file(directory.path(MARK)).is_err() {
         // Without this Python the modules prove nothing; the rest of the test does.
         eprintln!("/usr/bin/python3 is missing");
     }
@@ -443,11 +443,12 @@ fn results_that_were_edited_or_damaged() {
     let all: Vec<&str> = folders.iter().map(String::as_str).collect();
     let columns = ["--columns", "work,work.governing,errors.solver,steps"];
     let drawn = ["--only", "pressure,force-displacement", "--format", "svg"];
+    let some: Vec<&str> = all.iter().step_by(5).copied().collect();
     let mut commands =
-        vec![[&["table"][..], &all, &columns].concat(), [&["figures"][..], &all, &drawn].concat()];
+        vec![[&["table"][..], &all, &columns].concat(), [&["figures"][..], &some, &drawn].concat()];
     // These are slower: a folder of each kind.
     commands.extend(all.iter().skip(1).step_by(7).map(|folder| vec!["info", *folder]));
-    commands.push([vec!["report"], all.iter().skip(3).step_by(9).copied().collect()].concat());
+    commands.push([vec!["report"], all.iter().skip(3).step_by(25).copied().collect()].concat());
     commands
         .extend(all.iter().skip(2).step_by(11).map(|f| vec!["figures", *f, "--along", "bottom"]));
     for arguments in commands {
@@ -464,8 +465,8 @@ fn results_that_were_edited_or_damaged() {
             assert!(line.starts_with("error: ") && named, "{asked:?}: {line}");
         }
         // The undamaged files beside them are read.
-        if arguments.len() > 20 {
-            assert!(said.err.lines().count() > 20 && !said.out.is_empty(), "{asked:?}: {said:?}");
+        if arguments.contains(&"out/case0") {
+            assert!(said.err.lines().count() > 8 && !said.out.is_empty(), "{asked:?}: {said:?}");
         }
     }
 }
