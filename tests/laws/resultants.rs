@@ -309,7 +309,7 @@ fn a_clamp_and_a_foundation_with_a_common_node_exert_their_tractions_in_a_patch(
         // One component across the foundation.
         Corner { left: [false, true], ..Corner::of([0.0, -1.0, 0.0]) },
     ];
-    let damaged = "damage = { diffusion = 1, initial = 0.5 }";
+    let damaged = "damage = { diffusion = 1, lambda_d = 0, lambda_u = 0, initial = 0.5 }";
     for order in ORDERS {
         for (k, corner) in corners.iter().enumerate() {
             let cases = [(0.0, 1.0, [1.0, 1.0], ""), (0.0, 0.5, [1e-3, 1e6], damaged)];
