@@ -4,8 +4,11 @@
 mod command;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use signorini::interrupt;
+use signorini::petsc::Allocator;
 use std::{path::PathBuf, process::ExitCode};
+
+#[global_allocator]
+static ALLOCATOR: Allocator = Allocator { out_of_memory: command::out_of_memory };
 
 /// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
 #[derive(Parser)]
@@ -85,7 +88,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    if let Err(error) = interrupt::install() {
+    if let Err(error) = command::install() {
         command::tell("warning", &format!("no handlers for signals: {error}"));
     }
     let result = match Arguments::parse().command {

@@ -173,7 +173,10 @@ pub(super) fn accuracy_note(task: &Task, outcome: Option<&Outcome>) -> Option<(b
     let bars = outcome.bars.iter().filter(|bar| scene.requires_accuracy_of(&bar.name));
     let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
     let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
-    let of_stop = outcome.stopped.map(|stop| ("stopped_at".to_owned(), stop.bar() / stop.time));
+    let of_stop = outcome.stopped.map(|stop| match stop.bar() / stop.time {
+        unknown if unknown.is_nan() => ("stopped_at".to_owned(), f64::INFINITY),
+        relative => ("stopped_at".to_owned(), relative),
+    });
     let worst = bars.chain(norms.cloned()).chain(of_stop).max_by(|a, b| a.1.total_cmp(&b.1));
     let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
         let error = match percent(error) {

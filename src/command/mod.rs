@@ -9,6 +9,7 @@
 mod accuracy;
 mod check;
 mod checkpoint;
+mod ending;
 mod export;
 mod figures;
 mod new;
@@ -23,6 +24,7 @@ mod summary;
 mod task;
 
 pub use check::check;
+pub use ending::{install, out_of_memory};
 pub use export::{ExportArguments, export};
 pub use new::new;
 pub use provenance::version;

@@ -5,9 +5,7 @@
 //! - The gap has a kink there. A wedge whose slope changes by Δ presses with (E Δ/2π) ln(2a/r) at the distance r from its
 //!   tip (Johnson, Contact Mechanics, 5.2), a the half length of contact. A bisection of the edges adds (E Δ/2π) ln 2.
 
-use super::{
-    ContactRow, DiscreteProblem, SEEN, Singular, Value, contact_line::parts_from_open_nodes,
-};
+use super::{ContactRow, DiscreteProblem, SEEN, Singular, Value};
 use std::f64::consts::{LN_2, TAU};
 
 /// The figures of contact of Γ_C or of a foundation.
@@ -15,7 +13,7 @@ pub(crate) struct ContactFigures {
     /// The largest contact pressure, Pa, and the length of contact, m.
     pub values: [Value; 2],
     /// The coordinates, m, of the first and the last active node with the body on the left (on a closed part from its longest
-    /// stretch without contact), the one with the largest pressure, and the point of the resultant's line of action that is
+    /// stretch without contact), or of the node with a prescribed displacement next to it; of the one with the largest pressure, and the point of the resultant's line of action that is
     /// nearest to the middle between the first and the last one. NaN without contact.
     pub places: [f64; 8],
 }
@@ -23,17 +21,13 @@ pub(crate) struct ContactFigures {
 impl DiscreteProblem {
     /// The figures of the contact at some `rows` of Γ_C.
     pub(crate) fn contact_figures(&self, rows: &[ContactRow]) -> ContactFigures {
-        let ordered = parts_from_open_nodes(rows).concat();
-        let mut active = ordered.iter().filter(|row| row.active == 1);
         let peak = rows.iter().max_by(|a, b| a.pressure.total_cmp(&b.pressure));
-        let first = active.next();
         let place = |row: &ContactRow| [row.x, row.y];
-        let at = |row: Option<&ContactRow>| row.map_or([f64::NAN; 2], place);
-        let [start, end] = [first, active.next_back().or(first)].map(at);
+        let [start, end] = self.supports.contact.ends(rows).unwrap_or([[f64::NAN; 2]; 2]);
         let pressure = peak.map_or(0.0, |row| row.pressure);
         let middle = [0, 1].map(|k| 0.5 * (start[k] + end[k]));
         let acts_at = point_of_action(rows, middle, self.tolerance);
-        let of_peak = at(peak.filter(|row| row.pressure > 0.0));
+        let of_peak = peak.filter(|row| row.pressure > 0.0).map_or([f64::NAN; 2], place);
         let places = [start, end, of_peak, acts_at];
         ContactFigures {
             values: [

@@ -357,13 +357,9 @@ impl ContactLine {
         const LIGHT: f64 = 0.05;
         let (mut length, mut ends) = (0.0, Vec::new());
         for part in parts_from_open_nodes(rows) {
-            let [first, .., last] = &part[..] else { continue };
-            let rows = self.line_nodes.iter().map(|line_node| &line_node.row);
-            let is_here =
-                |of: &&ContactRow| (&of.boundary, of.part) == (&first.boundary, first.part);
-            let whole = rows.rev().find(is_here).map(|end| end.arc_length);
-            length += f64::from(first.active) * first.arc_length;
-            length += f64::from(last.active) * whole.map_or(0.0, |all| all - last.arc_length);
+            for (row, end) in self.beyond(&part) {
+                length += (row.arc_length - end.arc_length).abs();
+            }
             let largest = part.iter().fold(0.0, |most, row| f64::max(most, row.pressure));
             for (i, pair) in part.windows(2).enumerate() {
                 let [a, b] = [&pair[0], &pair[1]];
@@ -376,6 +372,47 @@ impl ContactLine {
             }
         }
         (length, ends)
+    }
+
+    /// The first and the last row of a part, if they are active and a node without a row comes next, each with the end of the
+    /// part: contact goes on up to it.
+    fn beyond<'a>(&'a self, part: &'a [ContactRow]) -> Vec<(&'a ContactRow, &'a ContactRow)> {
+        let (Some(first), Some(last)) = (part.first(), part.last()) else { return Vec::new() };
+        let is_here = |of: &&ContactRow| (&of.boundary, of.part) == (&first.boundary, first.part);
+        let here = || self.line_nodes.iter().map(|of| &of.row).filter(is_here);
+        let start = here().next().filter(|_| first.arc_length > 0.0).map(|start| (first, start));
+        let end = here().next_back().filter(|end| end.arc_length > last.arc_length);
+        let both = start.into_iter().chain(end.map(|end| (last, end)));
+        both.filter(|(row, _)| row.active == 1).collect()
+    }
+
+    /// The ends of contact by the `rows` of Γ_C, m: the first and the last active node, or the end of the part up to which contact
+    /// goes on. `None` without contact.
+    pub(super) fn ends(&self, rows: &[ContactRow]) -> Option<[[f64; 2]; 2]> {
+        let parts = parts_from_open_nodes(rows);
+        let mut active = parts.iter().flatten().filter(|row| row.active == 1);
+        let first = active.next()?;
+        let last = active.next_back().unwrap_or(first);
+        let mut ends = [first, last].map(|row| [row.x, row.y]);
+        for (row, end) in parts.iter().flat_map(|part| self.beyond(part)) {
+            let is_end = [row.arc_length > end.arc_length, row.arc_length < end.arc_length];
+            for (k, of) in [first, last].into_iter().enumerate() {
+                if is_end[k] && std::ptr::eq(of, row) {
+                    ends[k] = [end.x, end.y];
+                }
+            }
+        }
+        Some(ends)
+    }
+
+    /// Is a length of contact by the `rows` of Γ_C more than the edges of single nodes? `None` without contact.
+    pub fn resolves_length(&self, rows: &[ContactRow]) -> Option<bool> {
+        let both = |pair: &[ContactRow]| pair[0].active + pair[1].active == 2;
+        let is_long =
+            |part: &[ContactRow]| part.windows(2).any(both) || !self.beyond(part).is_empty();
+        let parts = parts_from_open_nodes(rows);
+        let is_active = rows.iter().any(|row| row.active == 1);
+        is_active.then(|| parts.iter().any(|part| is_long(part)))
     }
 }
 

@@ -16,6 +16,7 @@ mod fields;
 mod figures;
 mod losses;
 mod kept;
+mod krylov;
 mod keys;
 mod meshes;
 mod notebook;
