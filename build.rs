@@ -26,7 +26,7 @@ const PETSC: &str = "\
     MatSeqAIJRestoreArray|MatSeqAIJGetArrayRead|MatSeqAIJRestoreArrayRead|\
     MatCreateShell|MatShellSetOperation|MatShellGetContext|MatNullSpaceCreate|MatNullSpaceDestroy|MatSetNearNullSpace|MatGetNearNullSpace|\
     KSPCreate|KSPDestroy|KSPSetType|KSPSetOptionsPrefix|KSPSetFromOptions|KSPSetOperators|KSPSolve|\
-    KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReasonString|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|KSPGetTolerances|\
+    KSPGetType|KSPSetConvergenceTest|KSPSetNormType|KSPBuildResidual|KSPBuildSolution|KSPGetConvergedReasonString|KSPGetIterationNumber|KSPGetPC|KSPSetTolerances|KSPGetTolerances|\
     PCRegister|PCCreate_Shell|PCSetType|PCSetUp|PCSetReusePreconditioner|PCGetOperators|PCGetFailedReason|\
     PCFactorSetMatSolverType|\
     PCSetApplicationContext|PCGetApplicationContext|PCShellSetApply|PCShellSetSetUp|PCShellSetName|\

@@ -21,7 +21,9 @@ def row(name, value):
 def text_of_figure(figure):
     """The value of a figure with its bar, its unit, and why the mesh does not determine it."""
     flag, reason = flag_of(figure)
-    value = barred(figure["value"], figure["bar"]) if figure["bar"] else json.dumps(figure["value"])
+    # The mesh does not determine more digits of a flagged value.
+    value = f"{figure['value']:.2g}" if flag else json.dumps(figure["value"])
+    value = barred(figure["value"], figure["bar"]) if figure["bar"] else value
     return f"{value} {figure['unit']} {flag and f'{flag}: {reason}'}".strip()
 
 

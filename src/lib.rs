@@ -118,6 +118,11 @@ struct Readme;
 /// (Higham, Accuracy and Stability of Numerical Algorithms, ch. 2). Smaller differences are not seen.
 pub(crate) const ROUNDING: f64 = 4096.0 * f64::EPSILON;
 
+/// The maximum; NaN if either is NaN, unlike f64::max. So an error that is no number never looks small.
+pub(crate) fn maximum(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
+
 /// Sorts `items` by their numbers below `count`, in linear time. It also returns per number where its items start, and the end.
 pub(crate) fn by_number<T: Copy + Default>(
     count: usize,

@@ -6,8 +6,8 @@ mod command;
 use clap::{CommandFactory, Parser, Subcommand};
 use command::Failure;
 use signorini::{
-    interrupt,
     output::terminal::{keep, lost},
+    petsc::Allocator,
     printable::printable,
 };
 use std::{
@@ -15,6 +15,9 @@ use std::{
     path::PathBuf,
     process::{self, ExitCode},
 };
+
+#[global_allocator]
+static ALLOCATOR: Allocator = Allocator { out_of_memory: command::out_of_memory };
 
 /// Contact of a damageable elastic body with a rigid foundation (plane, quasistatic, frictionless).
 #[derive(Parser)]
@@ -94,7 +97,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    if let Err(error) = interrupt::install() {
+    if let Err(error) = command::install() {
         command::tell("warning", &format!("no handlers for signals: {error}"));
     }
     let result = match Arguments::try_parse().unwrap_or_else(refuse).command {

@@ -1,9 +1,9 @@
 //! The memory of this process and of the machine, from Linux (proc(5), cgroups(7)).
 
-use std::{env, fs, io, io::Write, path::Path};
+use std::{env, fs, path::Path};
 
 /// What to do if there is not enough memory.
-pub(crate) const REMEDY: &str = "take larger triangles, several processes (mpiexec), or multigrid \
+pub const REMEDY: &str = "take larger triangles, several processes (mpiexec), or multigrid \
                                  (-- -elastic_pc_type gamg -damage_pc_type gamg)";
 
 /// The peak memory of this process, bytes; 0 where the system does not report it.
@@ -59,10 +59,4 @@ fn number(file: impl AsRef<Path>, name: &str) -> Option<f64> {
     let text = fs::read_to_string(file).ok()?;
     let mut lines = text.lines().rev().map(|line| line.strip_prefix("total_").unwrap_or(line));
     lines.find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
-}
-
-/// Ends the process after a failed allocation. It allocates nothing.
-pub(crate) fn end_process() -> ! {
-    let _ = writeln!(io::stderr(), "error: there is not enough memory; {REMEDY}");
-    signal_hook::low_level::exit(1)
 }

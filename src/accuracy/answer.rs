@@ -138,7 +138,7 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn own_strains(&self) -> Vec<[Vector3<f64>; 3]> {
         let (body, state) = (&self.problem.body, &self.outcome.last.state);
         let strains = body.strains(&self.problem.strained(state).u);
-        strains.chunks(strains.len() / body.triangles.len()).map(at_vertices).collect()
+        strains.chunks(body.points_per_triangle()).map(at_vertices).collect()
     }
 
     /// The same for each triangle of the undivided mesh. Collective.

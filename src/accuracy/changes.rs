@@ -32,7 +32,7 @@ pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec
             largest[parent] = largest[parent].max(change.abs());
         }
     }
-    shares.iter_mut().for_each(|share| *share = if *share > 0.0 { *share / done } else { 0.0 });
+    shares.iter_mut().for_each(|share| *share = if *share == 0.0 { 0.0 } else { *share / done });
     [shares, largest]
 }
 
@@ -50,7 +50,7 @@ pub(super) fn displacement(
     let (problem, comm) = (fine.problem, fine.problem.body.nodes.partition.comm());
     let (body, elasticity) = (&problem.body, &problem.elasticity);
     let zeta = problem.zeta_at_points(&fine.outcome.last.state.zeta);
-    let per_triangle = zeta.len() / body.triangles.len();
+    let per_triangle = body.points_per_triangle();
     let square = |t: usize| {
         let parent = finer.parent_of_triangle[body.global_triangles[t]];
         let corners = mesh.triangles[parent].map(|node| mesh.nodes[node]);
@@ -71,5 +71,5 @@ pub(super) fn displacement(
         elasticity.d(body, t).dot(&products)
     };
     let square = comm.total((0..body.own_triangles).map(square).sum::<f64>());
-    if square > 0.0 { (square / size).sqrt() } else { 0.0 }
+    if square == 0.0 { 0.0 } else { (square / size).sqrt() }
 }

@@ -57,7 +57,9 @@ impl LoopState {
         let bars = outcome.bars.iter().filter(|bar| scene.requires_accuracy_of(&bar.name));
         let bars = bars.map(|bar| (bar.name.clone(), bar.relative()));
         let norms = scene.accuracy_of.is_empty().then_some(&adapted.worst).into_iter().flatten();
-        let of_stop = outcome.stopped.map(|stop| ("stopped_at".to_owned(), stop.bar() / stop.time));
+        let unknown = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
+        let of_stop = outcome.stopped.map(|stop| unknown(stop.bar() / stop.time));
+        let of_stop = of_stop.map(|error| ("stopped_at".to_owned(), error));
         let worst = bars.chain(norms.cloned()).chain(of_stop).max_by(|a, b| a.1.total_cmp(&b.1));
         let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
             let error = match percent(error) {

@@ -4,7 +4,10 @@ use super::{Measured, conclusion::KINKS_OF_TABLE};
 use crate::{
     model::von_mises,
     petsc::PetscError,
-    problem::{ContactRow, DiscreteProblem, NodalStress, Of, Singular, State, Value},
+    problem::{
+        ContactRow, Dimension, DiscreteProblem, Figure, NodalStress, Of, Singular, State, Value,
+        rows_of,
+    },
     scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
@@ -109,7 +112,8 @@ impl<'a> Extremes<'a> {
         values: &[Value],
         measured: &Measured,
     ) -> Result<Vec<Extreme>, PetscError> {
-        let mut all = Extremes::new(problem, state, values)?.named(&problem.singular_points());
+        let extremes = Extremes::new(problem, state, values)?;
+        let mut all = extremes.named(&problem.singular_points());
         for extreme in &mut all {
             let part = &problem.figures[problem.part_of(extreme.number, values)];
             match measured.unsettled.contains(&part.name) {
@@ -130,7 +134,32 @@ impl<'a> Extremes<'a> {
                 *reason += &format!(": {KINKS_OF_TABLE}");
             }
         }
+        all.extend(extremes.unresolved_lengths(state));
         Ok(all)
+    }
+
+    /// The lengths of contact that the mesh does not resolve: single nodes are active, or none, but the obstacle enters the body
+    /// between them. Collective.
+    fn unresolved_lengths(&self, state: &State) -> Vec<Extreme> {
+        let penetrates = self.problem.penetration_note(&[state]).is_some();
+        let unresolved = |(number, figure): (usize, &Figure)| {
+            let rows = match &figure.of {
+                Of::Boundary(name) => rows_of(&self.rows, name),
+                _ => &self.rows,
+            };
+            let is_resolved = self.problem.supports.contact.resolves_length(rows);
+            let reason = "contact of few nodes".to_owned();
+            (!is_resolved.unwrap_or(!penetrates)).then(|| Extreme {
+                number,
+                name: figure.name.clone(),
+                at: [f64::NAN; 2],
+                singular: None,
+                unresolved: Some(reason),
+            })
+        };
+        let lengths = self.problem.figures.iter().enumerate();
+        let lengths = lengths.filter(|(_, of)| of.dimension == Dimension::ContactLength);
+        lengths.filter_map(unresolved).collect()
     }
 
     /// The extremes with the names of the singular `points` near which they are. Collective.

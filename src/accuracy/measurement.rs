@@ -285,7 +285,10 @@ impl Measurement {
         let is_named = |name: &str| names.is_empty() || names.iter().any(|other| other == name);
         let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
         let mut errors: Vec<_> = errors
-            .map(|(name, relative, share)| MeasuredError { name: name.to_owned(), relative, share })
+            .map(|(name, relative, share)| {
+                let relative = if relative.is_nan() { f64::INFINITY } else { relative };
+                MeasuredError { name: name.to_owned(), relative, share }
+            })
             .collect();
         errors.sort_by(|a, b| (b.relative / b.share).total_cmp(&(a.relative / a.share)));
         errors

@@ -8,6 +8,7 @@
 
 mod check;
 mod checkpoint;
+mod ending;
 mod export;
 mod figures;
 mod new;
@@ -22,6 +23,7 @@ mod summary;
 mod task;
 
 pub use check::check;
+pub use ending::{install, out_of_memory};
 pub use export::{ExportArguments, export};
 pub use new::new;
 pub use provenance::version;

@@ -5,7 +5,7 @@ use signorini::{
     evolution::RunError,
     petsc::{Communicator, Session},
 };
-use std::time::Duration;
+use std::{process, time::Duration};
 
 /// The time for which a failed rank waits for the others. If they know of the failure, they arrive at once.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -35,7 +35,9 @@ pub fn barrier_or_abort(comm: Communicator, failure: Option<&RunError>) {
         && let Some(error) = failure
     {
         tell("error", &format!("rank {} of {}: {error}", comm.rank(), comm.size()));
-        comm.abort(Failure::from(error).code);
+        let code = Failure::from(error).code;
+        comm.abort(code);
+        process::exit(code.into());
     }
 }
 

@@ -4,6 +4,7 @@ use super::{figures::LastFigures, task::Task};
 use signorini::{
     accuracy::Adapted,
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
+    mesh::extent,
     output::terminal::{Progress, plain, say, with_bar},
     petsc::Communicator,
     printable::print_error,
@@ -127,7 +128,7 @@ pub fn conclusion(
         return [end].into_iter().chain(notes).collect();
     };
     let mut lines = vec![end, row("damage", damage(task, figures, outcome))];
-    lines.push(row("displacement", format!("largest {}", figures.full_text("displacement_max"))));
+    lines.push(row("displacement", displacement(task, figures)));
     lines.push(row("work", figures.full_text("work")));
     lines.extend(stresses(task, figures));
     lines.extend(contact(task, last, figures));
@@ -158,6 +159,18 @@ fn damage(task: &Task, figures: &LastFigures, outcome: Option<&Outcome>) -> Stri
     match outcome.and_then(|outcome| outcome.stopped) {
         Some(_) => format!("min ζ reached ζ_* = {}; before: {state}", task.problem.threshold()),
         None => state,
+    }
+}
+
+/// The largest displacement, and whether it is larger than the body.
+fn displacement(task: &Task, figures: &LastFigures) -> String {
+    let largest = format!("largest {}", figures.full_text("displacement_max"));
+    match figures.value("displacement_max") / extent(&task.problem.mesh().nodes) {
+        times @ 1.0.. => format!(
+            "{largest}, {times:.1} times the body: NOT an answer for a real body, as strains must be small; check the units \
+             of E and the loads"
+        ),
+        _ => largest,
     }
 }
 

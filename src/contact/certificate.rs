@@ -3,8 +3,8 @@
 //! This code shares nothing with the solvers: no nodal basis, no bound on an unknown, no mask of prescribed
 //! unknowns. A fault in any of these makes u wrong, and the certificate shows it.
 
-use super::{Kkt, NodalConstraint, Scales, kkt::worse};
-use crate::{ROUNDING, fem::Subdomain, petsc::Communicator};
+use super::{Kkt, NodalConstraint, Scales};
+use crate::{ROUNDING, fem::Subdomain, maximum, petsc::Communicator};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -114,20 +114,21 @@ impl Certificate {
         for at in &self.nodes {
             stationarity += free(next, at.node);
             next = at.node + 1;
-            primal = worse(primal, at.prescribed_error(answer, scales));
+            primal = maximum(primal, at.prescribed_error(answer, scales));
             let left = at.gaps_left(answer);
             let reaction = at.react(vector(answer.unbalanced, at.node), &left);
             dual += reaction.tension;
             tangential += reaction.tangential;
             for (((gap, number), left), force) in at.gaps.iter().zip(&left).zip(reaction.forces) {
                 let width = answer.values[*number].abs();
-                let counts = force.is_some() || -left > ROUNDING * width;
-                let depth = if !counts || *left >= 0.0 { 0.0 } else { -left };
-                primal = worse(primal, scales.of_displacement(depth));
                 let is_prescribed = force.is_none();
+                // NaN is neither shallow nor open.
+                let is_shallow = is_prescribed && -left <= ROUNDING * width;
+                let depth = if is_shallow || *left >= 0.0 { 0.0 } else { -left };
+                primal = maximum(primal, scales.of_displacement(depth));
                 let force = force.unwrap_or(0.0);
                 if !is_prescribed {
-                    complementarity = worse(complementarity, scales.natural(force, *left));
+                    complementarity = maximum(complementarity, scales.natural(force, *left));
                 }
                 let active = force > 0.0 && force * scales.displacement > left * scales.force;
                 points[usize::from(is_prescribed)].push(ContactPoint {
@@ -179,7 +180,7 @@ impl Conditions {
             let rounding = ROUNDING * value.abs().max(rigid.abs());
             scales.of_displacement(if off.abs() <= rounding { 0.0 } else { off.abs() })
         };
-        self.fixed.iter().map(error).fold(0.0, worse)
+        self.fixed.iter().map(error).fold(0.0, maximum)
     }
 
     fn rigid(&self, answer: Answer) -> Vector2<f64> {

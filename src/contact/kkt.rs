@@ -1,5 +1,6 @@
 //! The Karush–Kuhn–Tucker residuals of an answer.
 
+use crate::maximum;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -28,7 +29,8 @@ impl Scales {
     /// the sizes of gap and load (Facchinei and Pang, Finite-Dimensional Variational Inequalities and
     /// Complementarity Problems I, section 1.5.1: the min function).
     pub fn natural(self, force: f64, gap: f64) -> f64 {
-        self.of_force(force.max(0.0)).min(self.of_displacement(gap.max(0.0)))
+        let [force, gap] = [force, gap].map(|value| maximum(value, 0.0));
+        -maximum(-self.of_force(force), -self.of_displacement(gap))
     }
 }
 
@@ -56,7 +58,7 @@ impl Kkt {
 
     /// The largest of the four; NaN if any is.
     pub fn worst(&self) -> f64 {
-        self.named().into_iter().fold(0.0, |worst, (_, value)| worse(worst, value))
+        self.named().into_iter().fold(0.0, |worst, (_, value)| maximum(worst, value))
     }
 
     /// Are all at most `tolerance`? False for NaN.
@@ -74,13 +76,13 @@ impl Kkt {
         format!("the tolerance {tolerance:.1e} is missed by {}", missed.join(", "))
     }
 
-    /// The larger of each residual of two answers.
+    /// The larger of each residual of two answers; NaN if one is.
     pub fn max(&self, other: &Self) -> Self {
         Self {
-            stationarity: self.stationarity.max(other.stationarity),
-            primal: self.primal.max(other.primal),
-            dual: self.dual.max(other.dual),
-            complementarity: self.complementarity.max(other.complementarity),
+            stationarity: maximum(self.stationarity, other.stationarity),
+            primal: maximum(self.primal, other.primal),
+            dual: maximum(self.dual, other.dual),
+            complementarity: maximum(self.complementarity, other.complementarity),
         }
     }
 
@@ -107,9 +109,4 @@ impl fmt::Display for Kkt {
 /// A residual over its scale, where 0/0 is 0.
 fn relative(residual: f64, scale: f64) -> f64 {
     if residual == 0.0 { 0.0 } else { residual / scale }
-}
-
-/// The maximum; NaN if either is NaN, unlike f64::max.
-pub(super) fn worse(a: f64, b: f64) -> f64 {
-    if b > a || b.is_nan() { b } else { a }
 }

@@ -3,6 +3,7 @@
 use super::{Bound, Kkt, Scales};
 use crate::{
     linear::LinearSystem,
+    maximum,
     petsc::{Communicator, Matrix, PetscError, Session, Vector},
     phases::Phases,
 };
@@ -72,7 +73,7 @@ impl ContactProblem<'_> {
 
     /// ‖v‖_∞ over all ranks.
     pub(super) fn max_norm(&self, v: &Vector) -> Result<f64, PetscError> {
-        Ok(self.comm.max(v.read(|v| v.iter().fold(0.0_f64, |m, v| m.max(v.abs())))?))
+        Ok(self.comm.max(v.read(|v| v.iter().fold(0.0, |max, v| maximum(max, v.abs())))?))
     }
 
     /// v at the bounded unknowns.
@@ -98,17 +99,17 @@ impl ContactProblem<'_> {
     /// PETSc failed.
     pub fn residuals(&self, c: &Vector) -> Result<Kkt, PetscError> {
         let mut residual = self.residual(c)?;
-        let displacement = self.scales.displacement.max(self.max_norm(c)?);
+        let displacement = maximum(self.scales.displacement, self.max_norm(c)?);
         let scales = Scales { displacement, ..self.scales };
-        let (mut primal, mut pull, mut complementarity) = (0.0_f64, 0.0, 0.0_f64);
+        let (mut primal, mut pull, mut complementarity) = (0.0, 0.0, 0.0);
         let at_bounds = self.at_bounds(&residual)?.into_iter().zip(self.at_bounds(c)?);
         for (bound, (r, c)) in self.bounds.iter().zip(at_bounds) {
             let (p, above, below) = (-r, bound.upper - c, c - bound.lower);
-            primal = primal.max(-above.min(below));
-            complementarity = complementarity.max(scales.natural(p, above));
+            primal = maximum(primal, maximum(-above, -below));
+            complementarity = maximum(complementarity, scales.natural(p, above));
             match bound.lower.is_finite() {
-                true => complementarity = complementarity.max(scales.natural(-p, below)),
-                false => pull += p.min(0.0).powi(2),
+                true => complementarity = maximum(complementarity, scales.natural(-p, below)),
+                false => pull += maximum(-p, 0.0).powi(2),
             }
         }
         let free = residual.write(|r| {

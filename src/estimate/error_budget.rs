@@ -47,7 +47,7 @@ fn relative_to_damage(problem: &DiscreteProblem, field: &[f64], state: &State) -
         sums[1] += weight * (from - zeta) * (from - zeta);
     }
     vertices.partition.comm().sum(&mut sums);
-    (sums[1] > 0.0).then(|| (sums[0] / sums[1]).sqrt())
+    (sums[1] != 0.0).then(|| (sums[0] / sums[1]).sqrt())
 }
 
 /// A bound on the relative error of u in the energy norm due to errors δζ = `error`. As K δu = −δK u, it is
@@ -56,12 +56,12 @@ fn displacement_error_of(problem: &DiscreteProblem, error: &[f64], state: &State
     let body = &problem.body;
     let (zeta, error) = (problem.zeta_at_points(&state.zeta), body.at_points(error));
     let energies = problem.elasticity.energies(body, &zeta, &state.u);
-    let own = energies.len() / body.triangles.len() * body.own_triangles;
+    let own = body.points_per_triangle() * body.own_triangles;
     let mut sums = [0.0; 2];
     for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {
         sums[0] += energy * (error / zeta.max(zeta + error)).powi(2).min(1.0);
         sums[1] += energy;
     }
     body.nodes.partition.comm().sum(&mut sums);
-    if sums[1] > 0.0 { (sums[0] / sums[1]).sqrt() } else { 0.0 }
+    if sums[1] == 0.0 { 0.0 } else { (sums[0] / sums[1]).sqrt() }
 }

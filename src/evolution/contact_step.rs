@@ -42,7 +42,7 @@ use minimisation::displacement;
 use nalgebra::{DMatrix, DVector};
 use reference::Reference;
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
+use std::{ops::RangeInclusive, time::Instant};
 
 /// Solves the contact problems of a run, one after the other.
 pub struct ContactStep<'a> {
@@ -99,6 +99,8 @@ pub(super) struct ContactState {
 const MIN_LOAD: f64 = 1e-6;
 /// The energies of larger displacements, m, overflow.
 const MAX_DISPLACEMENT: f64 = 1e150;
+/// Forces and displacements whose squares do not lose digits to underflow, and are finite.
+const SQUARED: RangeInclusive<f64> = 1e-140..=f64::MAX;
 
 impl<'a> ContactStep<'a> {
     /// The contact step with the contact solver of `choices`.
@@ -178,6 +180,7 @@ impl<'a> ContactStep<'a> {
             self.next.warm_start.clear();
         }
         let (candidate, report) = self.solve_certified(step, &case)?;
+        self.check_scales(&candidate).map_err(|source| RunError::Step { step, time, source })?;
         let Candidate { u, kkt, scales, force, unbalanced, mut contact, prescribed, .. } =
             candidate;
         self.next.scales = scales;
@@ -213,6 +216,17 @@ impl<'a> ContactStep<'a> {
             unconstrained,
             skipped_damage_solve: false,
         })
+    }
+
+    /// Checks that forces and displacements have squares. If these underflow, zero residuals prove nothing.
+    fn check_scales(&self, candidate: &Candidate) -> Result<(), StepFailure> {
+        let Scales { force, displacement } = candidate.scales;
+        let force = force.max(self.problem.largest_load);
+        let has_squares = [force, displacement].iter().all(|of| SQUARED.contains(of));
+        match has_squares || candidate.forces == 0.0 {
+            true => Ok(()),
+            false => Err(StepFailure::Unrepresentable { force: candidate.forces, displacement }),
+        }
     }
 
     /// Accepts the step of the last solve, at `time`.

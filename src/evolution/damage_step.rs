@@ -137,8 +137,8 @@ impl DamageStep<'_> {
         let largest = min_max.0.abs().max(min_max.1);
         // If ζ is below ζ_* whatever the error of the solve is, the run stops as it should.
         let stops = min_max.0 + certificate.error <= problem.threshold();
-        let inexact = residual > largest_residual || certificate.balance > MAX_BALANCE * largest;
-        if inexact && !stops {
+        let is_exact = residual <= largest_residual && certificate.balance <= MAX_BALANCE * largest;
+        if !is_exact && !stops {
             return Err(planned.failed(StepFailure::DamageResidual(residual)));
         }
         Ok(DamageUpdate { zeta, min_max, certificate: Some(certificate) })

@@ -87,6 +87,18 @@ pub enum StepFailure {
          numbers in [material] and the loads"
     )]
     TooLarge(f64),
+    /// The squares of the forces or of the displacements over- or underflow.
+    #[error(
+        "forces of {force:.1e} with displacements of {displacement:.1e} in the units of the scene: double precision cannot \
+         hold their squares; choose other units, and look for extreme numbers in material.young, the loads, the \
+         displacements and the mesh"
+    )]
+    Unrepresentable {
+        /// The sum of all forces, N per metre of thickness.
+        force: f64,
+        /// The scale of the displacements, m.
+        displacement: f64,
+    },
     /// The error of an adaptive step is above the tolerance, however short the step is.
     #[error(
         "the damage changes too fast for time.tolerance, however short the step (does a load \

@@ -66,11 +66,14 @@ impl ErrorBudget {
             (None, "") => format!("{estimate} (energy norm)"),
             (None, reason) => format!("{estimate} (energy norm, estimated: no proof, as {reason})"),
         };
-        let measured = match self.displacement_bound {
-            Some(_) if self.is_measured => format!("{estimate} (measured), "),
-            _ => String::new(),
-        };
-        format!("from the mesh: u {measured}{error}")
+        // Beside a measured error, only a useful proof says more.
+        let is_proof =
+            self.displacement_bound.is_some_and(|of| of < 1.0) && reservations.is_empty();
+        match (self.is_measured, is_proof) {
+            (true, true) => format!("from the mesh: u {estimate} (measured), {error}"),
+            (true, false) => format!("from the mesh: u {estimate} (energy norm, measured)"),
+            _ => format!("from the mesh: u {error}"),
+        }
     }
 
     /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of

@@ -107,7 +107,7 @@ impl Outcome {
             self.damage_error.filter(|_| problem.damage().is_some() && self.stopped.is_none())?;
         let Stepping::Auto { tolerance, .. } = problem.scene().time?.stepping else { return None };
         // If an accuracy is required, the program has set the tolerance itself.
-        let missed = error > tolerance && problem.scene().accuracy.is_none();
+        let missed = (error > tolerance || error.is_nan()) && problem.scene().accuracy.is_none();
         let advice = match missed {
             true => format!(", more than time.tolerance = {tolerance}: lower it"),
             false => String::new(),

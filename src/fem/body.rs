@@ -132,6 +132,11 @@ impl Body {
         }
     }
 
+    /// The number of quadrature points of u in a triangle. It is known on a rank without triangles, too.
+    pub fn points_per_triangle(&self) -> usize {
+        if self.quadratic.is_some() { 3 } else { 1 }
+    }
+
     /// The number of the material of triangle `t`.
     #[inline(always)]
     pub fn material(&self, t: usize) -> usize {

@@ -38,8 +38,12 @@ impl Mass {
 
 /// A damage source φ of another author is positive or no number at a point.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the damage source is {phi} 1/s at ({}, {}), where ζ = {zeta}; it must be at most 0", place[0], place[1])]
+#[error(
+    "the damage law {law} gives the source {phi} 1/s at ({}, {}), where ζ = {zeta}; mend the law: its source must be a number, \
+     at most 0", place[0], place[1]
+)]
 pub struct WrongSource {
+    law: &'static str,
     phi: f64,
     place: [f64; 2],
     zeta: f64,
@@ -75,7 +79,8 @@ pub fn source(
             source.source(&DamagePoint { place: places[q], strain: strains[q], zeta: zeta[q], law })
         });
         if let Some(q) = values.iter().position(is_wrong) {
-            return Err(WrongSource { phi: values[q], place: places[q], zeta: zeta[q] });
+            let law = source.name();
+            return Err(WrongSource { law, phi: values[q], place: places[q], zeta: zeta[q] });
         }
         phi.push(values);
     }

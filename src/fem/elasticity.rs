@@ -137,7 +137,6 @@ impl Elasticity {
     /// a(u, u) on the elements that belong to this rank, twice their energy, N m per metre of thickness.
     pub(crate) fn energy(&self, body: &Body, zeta: &[f64], u: &[f64]) -> f64 {
         let energies = self.energies(body, zeta, u);
-        let own = energies.len() * body.own_triangles / body.triangles.len().max(1);
-        energies[..own].iter().sum()
+        energies[..body.points_per_triangle() * body.own_triangles].iter().sum()
     }
 }

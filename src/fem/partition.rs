@@ -1,6 +1,9 @@
 //! Ownership of nodes, and the exchange of values between ranks.
 
-use crate::petsc::{Communicator, Ghosts, PetscError};
+use crate::{
+    maximum,
+    petsc::{Communicator, Ghosts, PetscError},
+};
 
 /// The nodes of this rank: owned ones first, then ghosts, with their global indices.
 ///
@@ -98,15 +101,15 @@ impl Partition {
     /// max |u_i| over the nodes i of the undivided body, u_i the vector at node i. Collective.
     pub fn max_norm(&self, u: &[f64]) -> f64 {
         let (owned, _) = u[..2 * self.owned].as_chunks::<2>();
-        let square = owned.iter().map(|[x, y]| x * x + y * y).fold(0.0, f64::max);
+        let square = owned.iter().map(|[x, y]| x * x + y * y).fold(0.0, maximum);
         self.comm.max(square).sqrt()
     }
 
     /// (min, max) of a field with one component over the undivided body. Collective.
     pub fn min_max(&self, field: &[f64]) -> (f64, f64) {
         let owned = field[..self.owned].iter();
-        let (min, max) = owned
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), &z| (min.min(z), max.max(z)));
-        (self.comm.min(min), self.comm.max(max))
+        let start = [f64::NEG_INFINITY; 2];
+        let [low, high] = owned.fold(start, |[a, b], &z| [maximum(a, -z), maximum(b, z)]);
+        (-self.comm.max(low), self.comm.max(high))
     }
 }

@@ -1,7 +1,7 @@
 //! Infinitesimal rigid motions of a body, and their names in messages.
 
 use super::Body;
-use crate::mesh::place;
+use crate::{maximum, mesh::place};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -75,12 +75,12 @@ impl RigidMotion {
 
     /// The largest nodal |·| of the motion, and of u minus the motion, m. Collective.
     pub fn max_norms(&self, body: &Body, u: &[f64]) -> [f64; 2] {
-        let (mut rigid, mut rest) = (0.0_f64, 0.0_f64);
+        let (mut rigid, mut rest) = (0.0, 0.0);
         let nodes = body.nodes.points.iter().zip(u.as_chunks::<2>().0);
         for (&point, &[ux, uy]) in nodes.take(body.nodes.partition.owned()) {
             let [x, y] = self.at(point);
-            rigid = rigid.max(x * x + y * y);
-            rest = rest.max((ux - x) * (ux - x) + (uy - y) * (uy - y));
+            rigid = maximum(rigid, x * x + y * y);
+            rest = maximum(rest, (ux - x) * (ux - x) + (uy - y) * (uy - y));
         }
         [rigid, rest].map(|square| body.nodes.partition.comm().max(square).sqrt())
     }

@@ -71,6 +71,11 @@ impl Factor {
         self.comm
     }
 
+    /// The next analysis is for a factor in double precision.
+    pub(crate) fn set_full_precision(&mut self) {
+        self.state.precision = Precision::Full;
+    }
+
     /// Analyses the matrix. It returns false if the matrix or its interface is too large for a factor.
     /// Collective.
     ///

@@ -22,7 +22,10 @@ pub struct LinearSolver {
     factor: Factor,
     /// The number of rows for which the preconditioner was chosen, and whether it is the factor.
     chosen: Option<(usize, bool)>,
-    /// A with the rows and columns of prescribed unknowns zeroed, for preconditioners of PETSc.
+    /// Does the KSP keep prescribed unknowns at 0, because P⁻¹r is 0 there? The residual there, a reaction, must not count:
+    /// conjugate gradients take products with P⁻¹r alone, and the convergence test is ours.
+    ignores_reactions: bool,
+    /// A with the rows and columns of prescribed unknowns zeroed, for preconditioners of PETSc, and for other KSPs.
     modified: Option<Matrix>,
     /// b − A x.
     residual: Vector,
@@ -31,6 +34,8 @@ pub struct LinearSolver {
     first_norm: f64,
     /// d.
     correction: Vector,
+    /// b of a modified system, with 0 at prescribed unknowns.
+    right: Vector,
     /// P⁻¹ r of the first residual, and whether the KSP begins with it.
     expanded: Vector,
     prepared: bool,
@@ -73,11 +78,13 @@ impl LinearSolver {
             prefix: prefix.to_owned(),
             factor: Factor::new(session, precision),
             chosen: None,
+            ignores_reactions: true,
             modified: None,
             residual: zeros()?,
             norm: 0.0,
             first_norm: 0.0,
             correction: zeros()?,
+            right: zeros()?,
             expanded: zeros()?,
             prepared: false,
             iterations: 0,
@@ -233,23 +240,25 @@ impl LinearSolver {
         self.prescribe_in_copy(system)?;
         let prescribed = system.prescribed.unwrap_or(&[]);
         let clear = |d: &mut [f64]| prescribed.iter().for_each(|&i| d[i] = 0.0);
-        if self.modified.is_some() {
-            self.expanded.axpby(1.0, &self.residual, 0.0)?;
-            self.expanded.write(clear)?;
-        }
-        let first = take(&mut self.prepared).then_some(&self.expanded);
+        let is_prepared = take(&mut self.prepared);
         let (matrix, b) = match &self.modified {
-            Some(matrix) => (matrix, &self.expanded),
+            Some(matrix) => {
+                self.right.axpby(1.0, &self.residual, 0.0)?;
+                self.right.write(clear)?;
+                (matrix, &self.right)
+            }
             None => (system.matrix, &self.residual),
         };
         let problem = KspProblem { matrix, prescribed: system.prescribed, limit, most };
-        let mut own = TimedFactor { factor: &mut self.factor, first, system };
+        let first = is_prepared.then_some(&self.expanded);
+        let of = self.modified.is_some().then_some(b);
+        let mut own = TimedFactor { factor: &mut self.factor, first, of, system };
         let solved = self.ksp.solve(&problem, &mut own, b, &mut self.correction)?;
         self.norm = solved.norm;
         if self.modified.is_some() {
             self.correction.write(clear)?;
-            system.multiply(&self.correction, &mut self.expanded)?;
-            self.residual.axpby(-1.0, &self.expanded, 1.0)?;
+            system.multiply(&self.correction, &mut self.right)?;
+            self.residual.axpby(-1.0, &self.right, 1.0)?;
         } else {
             self.residual.axpby(1.0, self.ksp.residual(), 0.0)?;
         }

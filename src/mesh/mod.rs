@@ -118,7 +118,8 @@ impl Mesh {
     }
 
     /// Per node: the size that triangles shall have there, m. It is the `wanted` size where one is given, and elsewhere the
-    /// mean length of the sides at the node. From node to node it grows by at most a third of their distance.
+    /// mean length of the sides at the node. One sweep over the sides limits the growth from node to node to a third of their
+    /// distance; against the order of the triangles it may stay larger.
     pub fn graded_sizes(&self, wanted: impl IntoIterator<Item = (usize, f64)>) -> Vec<f64> {
         let sides = || self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
         let mut sums = vec![(0.0, 0.0); self.nodes.len()];

@@ -22,6 +22,11 @@ pub trait DamageSource {
     /// φ(ε, ζ) ≤ 0 at a point, 1/s.
     fn source(&self, point: &DamagePoint) -> f64;
 
+    /// The name of the law in messages; by default the name of its type.
+    fn name(&self) -> &'static str {
+        std::any::type_name::<Self>()
+    }
+
     /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ, for ζ′ = `rate`. The errors of the
     /// time steps follow from it. The default, [`DamageLaw::error_growth`], holds for every
     /// φ = −(λ_D (1 − ζ)/ζ + Ψ(ε) − λ_W)₊ with a quadratic Ψ.

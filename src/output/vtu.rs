@@ -139,7 +139,10 @@ impl FieldWriter {
                 write_whole(&path, piece(&mesh, &points, &cells).as_bytes())
             };
             let thread = thread::Builder::new().spawn(write);
-            self.pending = Some((thread.unwrap_or_else(|_| crate::memory::end_process()), entry));
+            self.pending = Some((
+                thread.map_err(|error| OutputError::new(Path::new("a frame"), error))?,
+                entry,
+            ));
             return self.contact.add(&contact_file, state.time, &contact);
         }
         let vertices = &problem.body.vertices.partition;

@@ -84,25 +84,23 @@ impl Communicator {
         self.total(value as f64) as usize
     }
 
-    /// The maximum of the ranks' values; NaN counts as −∞.
+    /// The maximum of the ranks' values; NaN if one of them is. MPI does not define the maximum with a NaN.
     pub fn max(self, value: f64) -> f64 {
-        if self.is_serial() {
-            return value;
-        }
-        let mut max = [if value.is_nan() { f64::NEG_INFINITY } else { value }];
+        let mut max = if value.is_nan() { [f64::INFINITY, 1.0] } else { [value, 0.0] };
         self.reduce(&mut max, raw::MPI_MAX);
-        max[0]
+        if max[1] > 0.0 { f64::NAN } else { max[0] }
     }
 
-    /// The minimum of the ranks' values; NaN counts as ∞.
+    /// The minimum of the ranks' values; NaN if one of them is.
     pub fn min(self, value: f64) -> f64 {
         -self.max(-value)
     }
 
-    /// The minimum of the ranks' values and the first rank that has it (as MPI_MINLOC).
+    /// The minimum of the ranks' values and the first rank that has it (as MPI_MINLOC), or that has NaN.
     pub fn min_with_rank(self, value: f64) -> (f64, usize) {
         let minimum = self.min(value);
-        let first = self.min(if value == minimum { self.rank as f64 } else { f64::INFINITY });
+        let has_it = value == minimum || value.is_nan();
+        let first = self.min(if has_it { self.rank as f64 } else { f64::INFINITY });
         (minimum, first as usize)
     }
 
@@ -168,13 +166,12 @@ impl Communicator {
         }
     }
 
-    /// Ends all ranks at once with an exit code, wherever they are (MPI_Abort).
-    pub fn abort(self, code: u8) -> ! {
+    /// Ends all of several ranks at once with an exit code, wherever they are (MPI_Abort).
+    pub fn abort(self, code: u8) {
         if !self.is_serial() {
             // SAFETY: MPI runs on several ranks.
             unsafe { raw::MPI_Abort(world(), i32::from(code)) };
         }
-        std::process::exit(i32::from(code))
     }
 
     /// Replaces `values` by their reduction over the ranks (MPI_Allreduce).

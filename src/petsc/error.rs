@@ -1,7 +1,7 @@
 //! PETSc's error codes with PETSc's messages.
 
 use super::raw;
-use crate::memory::{REMEDY, end_process};
+use crate::memory::REMEDY;
 use std::{
     borrow::Cow,
     cell::RefCell,
@@ -58,10 +58,12 @@ pub(super) unsafe extern "C" fn keep_message(
             // SAFETY: PETSc passes NUL-terminated strings that live during this call.
             false => unsafe { CStr::from_ptr(p) }.to_string_lossy(),
         };
-        if text(function).contains("Malloc") {
-            end_process();
-        }
-        MESSAGE.set(format!("{} (in {})", text(message).trim_end(), text(function)));
+        MESSAGE.set(match text(function) {
+            function if function.contains("Malloc") => {
+                format!("there is not enough memory; {REMEDY}")
+            }
+            function => format!("{} (in {function})", text(message).trim_end()),
+        });
     }
     code
 }

@@ -1,7 +1,9 @@
 //! Dividing a mesh among the ranks (<https://petsc.org/release/manualpages/MatOrderings/>).
 
-use super::{Matrix, Pattern, PetscError, Session, check, handle::Handle, raw, session::world};
-use std::{ptr, slice};
+use super::{
+    Matrix, Pattern, PetscError, Session, check, handle::Handle, raw, session::world, vector::lent,
+};
+use std::ptr;
 
 /// Divides `nodes` nodes among the ranks (PTScotch, a parallel multilevel method). All ranks get about the
 /// same number of nodes, and few edges between nodes of one cell are cut. `cells` lists the nodes of each
@@ -34,7 +36,7 @@ pub(crate) fn divide(
         let own = Handle::new(raw::ISDestroy, apply)?;
         let all = Handle::new(raw::ISDestroy, |handle| raw::ISAllGather(own.raw(), handle))?;
         check(raw::ISGetIndices(all.raw(), &mut indices))?;
-        let owner = slice::from_raw_parts(indices, nodes).iter().map(|&r| r as usize).collect();
+        let owner = lent(indices, nodes).iter().map(|&r| r as usize).collect();
         check(raw::ISRestoreIndices(all.raw(), &mut indices))?;
         Ok(owner)
     }

@@ -1,13 +1,7 @@
 //! PETSc's objects and their owners.
 
-use super::{PetscError, check, raw};
-use std::{
-    ptr,
-    sync::atomic::{AtomicUsize, Ordering},
-};
-
-/// The number of PETSc's objects that still have an owner.
-pub(super) static OPEN_HANDLES: AtomicUsize = AtomicUsize::new(0);
+use super::{PetscError, check, raw, session::Turn};
+use std::{ptr, rc::Rc};
 
 /// PETSc's function that releases one reference to an object and sets the pointer to null.
 type Destroy<T> = unsafe extern "C" fn(*mut *mut T) -> raw::PetscErrorCode;
@@ -16,8 +10,9 @@ type Destroy<T> = unsafe extern "C" fn(*mut *mut T) -> raw::PetscErrorCode;
 #[derive(Debug)]
 pub(super) struct Handle<T> {
     raw: *mut T,
-    /// `None` if PETSc keeps the reference.
-    destroy: Option<Destroy<T>>,
+    /// `None` if PETSc keeps the reference. An owner keeps the turn of its thread: no other thread calls PETSc, and PETSc does not
+    /// end, while the object exists.
+    destroy: Option<(Destroy<T>, Rc<Turn>)>,
 }
 
 impl<T> Handle<T> {
@@ -26,10 +21,9 @@ impl<T> Handle<T> {
         destroy: Destroy<T>,
         create: impl FnOnce(*mut *mut T) -> raw::PetscErrorCode,
     ) -> Result<Self, PetscError> {
-        let mut raw = ptr::null_mut();
+        let (mut raw, turn) = (ptr::null_mut(), Turn::of_this_thread()?);
         check(create(&mut raw))?;
-        OPEN_HANDLES.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { raw, destroy: Some(destroy) })
+        Ok(Self { raw, destroy: Some((destroy, turn)) })
     }
 
     /// An object that PETSc lends to a callback.
@@ -45,10 +39,9 @@ impl<T> Handle<T> {
 
 impl<T> Drop for Handle<T> {
     fn drop(&mut self) {
-        if let Some(destroy) = self.destroy {
+        if let Some((destroy, _)) = &self.destroy {
             // SAFETY: the reference is ours and not used afterwards; an error cannot be acted on here.
             unsafe { destroy(&mut self.raw) };
-            OPEN_HANDLES.fetch_sub(1, Ordering::Relaxed);
         }
     }
 }

@@ -111,6 +111,16 @@ impl Ksp {
         }
     }
 
+    /// The type (KSPGetType), as "cg".
+    pub(crate) fn kind(&self) -> Result<String, PetscError> {
+        let mut kind = ptr::null();
+        // SAFETY: a live handle with a type, whose name PETSc keeps.
+        unsafe {
+            check(raw::KSPGetType(self.handle.raw(), &mut kind))?;
+            Ok(CStr::from_ptr(kind).to_string_lossy().into_owned())
+        }
+    }
+
     /// Whether the preconditioner is of the type [`shell_preconditioner::NAME`].
     pub(crate) fn uses_own_factor(&self) -> Result<bool, PetscError> {
         let mut same = petsc_bool(false);

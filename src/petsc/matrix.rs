@@ -14,10 +14,10 @@ use super::{
     options::petsc_bool,
     raw,
     session::world,
-    vector::{index, same_size},
+    vector::{index, lent, same_size},
 };
 use operator::Shell;
-use std::{ops::Range, ptr, slice};
+use std::{ops::Range, ptr};
 
 /// A square sparse matrix. Each rank owns a contiguous range of rows.
 pub struct Matrix {
@@ -246,13 +246,8 @@ impl Matrix {
         // SAFETY: a live handle; PETSc checks the row and lends `count` entries of it.
         unsafe {
             check(raw::MatGetRow(self.stored(), row, &mut count, &mut columns, &mut values))?;
-            let result = match count as usize {
-                0 => reader(&[], &[]),
-                count => reader(
-                    slice::from_raw_parts(columns, count),
-                    slice::from_raw_parts(values, count),
-                ),
-            };
+            let count_of_row = count as usize;
+            let result = reader(lent(columns, count_of_row), lent(values, count_of_row));
             check(raw::MatRestoreRow(self.stored(), row, &mut count, &mut columns, &mut values))?;
             Ok(result)
         }

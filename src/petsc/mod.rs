@@ -31,6 +31,7 @@ mod raw {
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }
 
+pub use allocator::Allocator;
 pub use communicator::Communicator;
 pub use error::PetscError;
 pub use matrix::{Matrix, Pattern};

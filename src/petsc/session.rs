@@ -1,20 +1,39 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
-    options::c_string, raw, shell_preconditioner,
+    Communicator, PetscError, check, error::keep_message, options, options::c_string, raw,
+    shell_preconditioner,
 };
 use crate::memory::address_space;
 use std::{
+    cell::RefCell,
     env,
     ffi::{CStr, CString, OsString, c_char, c_int},
     path::Path,
     ptr,
-    sync::{Mutex, MutexGuard, PoisonError, atomic::Ordering},
+    rc::{Rc, Weak},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 /// PETSc is not thread-safe: only the thread that has this lock may call it.
 static TURN: Mutex<()> = Mutex::new(());
+
+thread_local! {
+    /// The turn of this thread, while a session or an object of PETSc keeps it.
+    static OWN_TURN: RefCell<Weak<Turn>> = RefCell::default();
+}
+
+/// The turn of a thread. Its sessions and all objects of PETSc that it owns keep it.
+#[derive(Debug)]
+pub(super) struct Turn(#[allow(dead_code)] MutexGuard<'static, ()>);
+
+impl Turn {
+    /// The turn that this thread has: only a session or another object leads to a new object.
+    pub(super) fn of_this_thread() -> Result<Rc<Self>, PetscError> {
+        let own = OWN_TURN.with_borrow(Weak::upgrade);
+        own.ok_or_else(|| PetscError::ours("this thread has no session of PETSc"))
+    }
+}
 
 /// The address space of OpenBLAS's buffer (BUFFER_SIZE in its common_x86_64.h) and a lower bound of MPI's, bytes.
 const BUFFER: f64 = 134.3e6;
@@ -22,21 +41,25 @@ const MPI: f64 = 30e6;
 
 /// The right to use PETSc; every object of this module is made from it.
 ///
-/// PETSc is started by the first session of the process. Sessions of several threads
-/// (tests) take turns.
+/// PETSc is started by the first session of the process. Threads (tests) take turns. A turn lasts until the last session of the
+/// thread and the last object made from it are dropped, so no object can be used without a turn.
 pub struct Session {
-    _turn: MutexGuard<'static, ()>,
+    turn: Rc<Turn>,
 }
 
 impl Session {
     /// Starts PETSc with `options` (as on a PETSc command line). If PETSc runs already, waits until no other
-    /// session uses it, and adds `options` to its options database. MPI changes the environment of the process as it
+    /// thread uses it, and adds `options` to its options database. MPI changes the environment of the process as it
     /// starts, and no other thread may read it meanwhile.
     ///
     /// # Errors
     /// PETSc or MPI could not be initialised, or rejected an option.
     pub fn start(options: &[String]) -> Result<Self, PetscError> {
-        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let turn = Turn::of_this_thread().unwrap_or_else(|_| {
+            let turn = Turn(TURN.lock().unwrap_or_else(PoisonError::into_inner));
+            Rc::new(turn)
+        });
+        OWN_TURN.set(Rc::downgrade(&turn));
         // CHOLMOD asks OpenMP for 4 threads in very short loops, whatever OMP_NUM_THREADS says. Waking them
         // would take a third of a factorisation's time. The setting is one of each thread.
         // Each thread would reserve 64 MB of address space for a heap of its own.
@@ -64,7 +87,7 @@ impl Session {
         } else if !options.is_empty() {
             options::insert(options)?;
         }
-        Ok(Self { _turn: turn })
+        Ok(Self { turn })
     }
 
     /// The ranks of the world communicator.
@@ -75,9 +98,9 @@ impl Session {
     /// Ends PETSc and MPI. Call it last; without it MPI complains at exit.
     ///
     /// # Errors
-    /// Objects made from this session still have an owner, or PETSc fails to finalize.
+    /// The thread still has objects or another session, or PETSc fails to finalize.
     pub fn finalize(self) -> Result<(), PetscError> {
-        match OPEN_HANDLES.load(Ordering::Relaxed) {
+        match Rc::strong_count(&self.turn) - 1 {
             0 => {
                 // The caller lists the unused options; PETSc would do so again.
                 options::set_default_option("-options_left", "0")?;

@@ -47,7 +47,7 @@ impl Vector {
         // SAFETY: PETSc lends `owned` values until they are restored below.
         unsafe {
             check(raw::VecGetArrayRead(self.raw(), &mut data))?;
-            let result = reader(slice::from_raw_parts(data, self.owned));
+            let result = reader(lent(data, self.owned));
             check(raw::VecRestoreArrayRead(self.raw(), &mut data))?;
             Ok(result)
         }
@@ -62,7 +62,7 @@ impl Vector {
         // SAFETY: as in `read`; `&mut self` excludes other readers.
         unsafe {
             check(raw::VecGetArray(self.raw(), &mut data))?;
-            let result = writer(slice::from_raw_parts_mut(data, self.owned));
+            let result = writer(lent_mut(data, self.owned));
             check(raw::VecRestoreArray(self.raw(), &mut data))?;
             Ok(result)
         }
@@ -116,6 +116,24 @@ impl Vector {
     pub fn owned(&self) -> usize {
         self.owned
     }
+}
+
+/// The `count` values that PETSc lends; it may lend null for none, which is no slice.
+///
+/// # Safety
+/// `data` has `count` values during the life of the slice.
+pub(super) unsafe fn lent<'a, T>(data: *const T, count: usize) -> &'a [T] {
+    // SAFETY: the caller's promise.
+    if count == 0 { &[] } else { unsafe { slice::from_raw_parts(data, count) } }
+}
+
+/// As [`lent`], for writing.
+///
+/// # Safety
+/// As of [`lent`], and there is no other reference to the values.
+pub(super) unsafe fn lent_mut<'a, T>(data: *mut T, count: usize) -> &'a mut [T] {
+    // SAFETY: the caller's promise.
+    if count == 0 { &mut [] } else { unsafe { slice::from_raw_parts_mut(data, count) } }
 }
 
 /// A number of entries in PETSc's integer type.

@@ -373,6 +373,14 @@ impl ContactLine {
         }
         (length, ends)
     }
+
+    /// Is a length of contact by the `rows` of Γ_C more than the edges of single nodes? `None` without contact.
+    pub fn resolves_length(&self, rows: &[ContactRow]) -> Option<bool> {
+        let both = |pair: &[ContactRow]| pair[0].active + pair[1].active == 2;
+        let is_active = rows.iter().any(|row| row.active == 1);
+        let parts = parts_from_open_nodes(rows);
+        is_active.then(|| parts.iter().any(|part| part.windows(2).any(both)))
+    }
 }
 
 /// The rows of each part. A closed part begins and ends at one node: the first one of the longest stretch without contact,

@@ -139,7 +139,7 @@ impl Loads {
             let own = self.at(body, t).into_iter().take(2 * partition.owned());
             size = size.max(partition.comm().total(own.map(f64::abs).sum()));
         }
-        [error, if error > 0.0 { error / size } else { 0.0 }]
+        [error, if error == 0.0 { 0.0 } else { error / size }]
     }
 
     /// The values of all rows at time t, m: prescribed displacements u·d, and gaps.

@@ -210,7 +210,9 @@ impl DiscreteProblem {
     /// Nodal loads at `time`, N per metre of thickness. Rounding, as in sin(pi) = 1.2e-16, counts as zero.
     pub fn load(&self, time: f64) -> Vec<f64> {
         let mut load = self.loads.at(&self.body, time);
-        if self.body.nodes.partition.norm(&load, 2) <= ROUNDING * self.largest_load {
+        let rounding = ROUNDING * self.largest_load;
+        // Loads whose squares underflow have no norm; a later check refuses them.
+        if rounding > 0.0 && self.body.nodes.partition.norm(&load, 2) <= rounding {
             load.fill(0.0);
         }
         load

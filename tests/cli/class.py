@@ -10,7 +10,7 @@ except ImportError as error:
     sys.exit(f"skipped: {error}")
 
 notebook = nbformat.read(sys.argv[1], as_version=4)
-nbclient.NotebookClient(notebook, timeout=300).execute()
+nbclient.NotebookClient(notebook, timeout=None).execute()
 code = [cell for cell in notebook.cells if cell.cell_type == "code"]
 outputs = [output for cell in code for output in cell.outputs]
 pictures = sum("image/png" in output.get("data", {}) for output in outputs)

@@ -19,7 +19,7 @@ pub const ENDLESS: [&str; 4] = ["run", "scene.toml", "--set", "time.step=1e-6"];
 fn a_folder_has_one_run_at_a_time() {
     let directory = TestDirectory::new();
     let mut first = start(&mut directory.command(&ENDLESS));
-    wait_until("a frame", || directory.path("out/scene/fields.pvd").exists());
+    wait_until(&mut first, "a frame", || directory.path("out/scene/fields.pvd").exists());
     directory.say(&["run", "scene.toml"]).fails(2, &["out/scene: another run writes there"]);
     first.kill().expect("it lives");
     assert_eq!(first.wait().expect("it ends").signal(), Some(9));
@@ -103,7 +103,7 @@ fn gmsh_hangs() {
 
     fs::remove_file(directory.path("bin/gmsh.started")).expect("gmsh was started");
     let mut child = start(directory.command(&["run", "geo/scene.toml"]).env("PATH", &path));
-    wait_until("gmsh", || directory.names("bin").len() == 2);
+    wait_until(&mut child, "gmsh", || directory.names("bin").len() == 2);
     sleep(Duration::from_millis(50));
     signal(child.id(), "TERM");
     assert_eq!(child.wait().expect("it ends").code(), Some(143));

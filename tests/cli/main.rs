@@ -17,6 +17,7 @@ mod fields;
 mod figures;
 mod losses;
 mod kept;
+mod krylov;
 mod keys;
 mod meshes;
 mod notebook;

@@ -33,7 +33,7 @@ fn a_killed_run_goes_on_as_if_it_had_not_been() {
 
         let mut run = started(&directory, "killed", &arguments);
         for step in [60, 110] {
-            wait_until("a checkpoint", || directory.has_checkpoint("killed", step));
+            wait_until(&mut run, "a checkpoint", || directory.has_checkpoint("killed", step));
             run.kill().expect("it lives");
             run.wait().expect("it ends");
             directory.frames("killed").iter().for_each(|(_, file)| {
@@ -64,7 +64,7 @@ fn a_repetition_with_shorter_steps_goes_on_as_if_it_had_not_been_interrupted() {
         let said = fs::File::create(directory.path("said")).expect("mine");
         let all = [&["run", "scene.toml", "--out", "ended"], &arguments[..]].concat();
         let mut run = directory.command(&all).stdout(said).spawn().expect("the program starts");
-        wait_until("the repetition", || directory.read("said").contains("again "));
+        wait_until(&mut run, "the repetition", || directory.read("said").contains("again "));
         signal(run.id(), "TERM");
         assert_eq!(run.wait().expect("it ends").code(), Some(143));
         let said = directory.run(&[&arguments[..], &["--out", "ended", "--restart"]].concat());
@@ -82,7 +82,7 @@ fn a_signal_ends_a_run_behind_a_step() {
         let errors = out.try_clone().expect("mine");
         let mut command = directory.command(&ENDLESS);
         let mut run = command.stdout(out).stderr(errors).spawn().expect("the program starts");
-        wait_until("a frame", || directory.path("out/scene/fields.pvd").exists());
+        wait_until(&mut run, "a frame", || directory.path("out/scene/fields.pvd").exists());
         signal(run.id(), name);
         assert_eq!(run.wait().expect("it ends").code(), Some(code));
         let said = directory.read("said");
@@ -104,7 +104,7 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
     let said = directory.run(&["--set", "time.end=0.1", "--restart"]);
     assert!(said.err.contains("has no checkpoint; the run begins at its start"), "{}", said.err);
     let mut run = started(&directory, "out", &[&LONG[..], &OFTEN].concat());
-    wait_until("a checkpoint", || directory.has_checkpoint("out", 10));
+    wait_until(&mut run, "a checkpoint", || directory.has_checkpoint("out", 10));
     signal(run.id(), "TERM");
     run.wait().expect("it ends");
     let file = directory.names("out").into_iter().find(|name| name.starts_with("checkpoint"));

@@ -88,6 +88,26 @@ fn a_force_in_the_cone_of_a_corners_normals_is_carried_and_no_other() {
     close_relative(judged([-1.0, 0.0]).0.dual, 0.1, 1e-15);
 }
 
+/// Comparisons and extremes drop a NaN; the residuals, their parts and the worst ones of a run keep it.
+#[test]
+fn what_is_not_a_number_stays_in_every_residual() {
+    let nan = f64::NAN;
+    for (force, left) in [(nan, 0.0), (0.0, nan), (nan, 1.0), (1.0, nan), (nan, nan)] {
+        assert!(SCALES.natural(force, left).is_nan(), "natural({force}, {left})");
+    }
+    let good = Kkt::default();
+    for kkt in [
+        Kkt { stationarity: nan, ..good },
+        Kkt { primal: nan, ..good },
+        Kkt { dual: nan, ..good },
+        Kkt { complementarity: nan, ..good },
+    ] {
+        for worst in [kkt.max(&good), good.max(&kkt)] {
+            assert!(worst.worst().is_nan() && !worst.within(1e300), "{worst}");
+        }
+    }
+}
+
 #[test]
 fn what_is_not_a_number_is_never_within_a_tolerance() {
     for fault in 0..4 {

@@ -311,3 +311,55 @@ fn materials_side_by_side_press_with_a_pressure_each_up_to_their_interface() {
         }
     }
 }
+
+/// Beside a clamped node contact goes on up to it: its length and its places say the same, also with one node between two clamps.
+#[test]
+fn length_and_places_of_contact_beside_clamps_agree() {
+    for (degree, cells, left, right) in
+        [(1, 2, true, true), (1, 5, true, false), (2, 4, true, true), (1, 5, false, true)]
+    {
+        let side = |name: &str, is_clamped: bool| match is_clamped {
+            true => format!("{{ name = '{name}', displacement = [0, '-0.001*y'] }}"),
+            false => format!("{{ name = '{name}', symmetry = true }}"),
+        };
+        let text = format!(
+            "discretisation.displacement = {degree}
+             material = {{ young = 200, poisson = 0, plane = 'stress' }}
+             boundary = [{}, {}, {{ name = 'bottom', gap = 0 }}, {{ name = 'top', traction = [0, -0.2] }}]",
+            side("left", left),
+            side("right", right)
+        );
+        let problem = problem(square(cells), &text).unwrap_or_else(|e| panic!("{e}"));
+        let last = run(&problem, SOLVERS[0]).last;
+        let figures = figures(&problem, &last);
+        let value = |name: &str| figures[&format!("bottom.{name}")];
+        close_relative(value("contact_length"), 1.0, 1e-9);
+        close_relative(value("contact_end_x") - value("contact_start_x"), 1.0, 1e-9);
+        let (rows, _) = problem.supports.contact.rows(&problem.body, &last.state);
+        assert_eq!(problem.supports.contact.resolves_length(&rows), Some(true));
+    }
+}
+
+/// A single active node shows no length, whatever its share of the edges is; two neighbours do.
+#[test]
+fn a_length_of_single_nodes_is_not_resolved() {
+    let row = |active| ContactRow { boundary: "g".into(), active, ..ContactRow::default() };
+    let rows = |flags: &[u8]| -> Vec<ContactRow> {
+        let place = |(i, &active): (usize, &u8)| ContactRow {
+            arc_length: i as f64,
+            x: i as f64,
+            ..row(active)
+        };
+        flags.iter().enumerate().map(place).collect()
+    };
+    let line = signorini::problem::ContactLine::default();
+    for (flags, expected) in [
+        (&[0, 0, 0][..], None),
+        (&[0, 1, 0], Some(false)),
+        (&[1, 0, 1], Some(false)),
+        (&[0, 1, 1], Some(true)),
+        (&[1, 0, 0, 1, 1], Some(true)),
+    ] {
+        assert_eq!(line.resolves_length(&rows(flags)), expected, "{flags:?}");
+    }
+}

@@ -20,6 +20,8 @@ use signorini::{
     scene::Scene,
 };
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 /// Calls a function as a damage source.
 struct Source<F>(F);
 
@@ -91,9 +93,39 @@ fn a_source_that_heals_or_is_no_number_is_told_with_its_place() {
         let run = Simulation::new(&problem).law(Box::new(law)).run(&session);
         let message = run.expect_err("the source is refused").to_string();
         let expected =
-            format!("step 0 (t = 0): the damage source is {wrong} 1/s at (1, 1), where ζ = 1; ");
-        assert!(message.starts_with(&expected), "{message}");
+            format!("gives the source {wrong} 1/s at (1, 1), where ζ = 1; mend the law: ");
+        assert!(message.starts_with("step 0 (t = 0): the damage law "), "{message}");
+        assert!(message.contains(&expected), "{message}");
     }
+}
+
+/// A law that fails in the course of a run: its name is told at its first failure, without shorter steps.
+struct Failing<'a>(&'a AtomicUsize);
+
+impl DamageSource for Failing<'_> {
+    fn source(&self, point: &DamagePoint) -> f64 {
+        if point.zeta > 0.99 {
+            return -0.1;
+        }
+        self.0.fetch_add(1, Ordering::Relaxed);
+        f64::NAN
+    }
+}
+
+#[test]
+fn a_law_without_a_number_is_refused_at_once_by_its_name() {
+    static FAILED: AtomicUsize = AtomicUsize::new(0);
+    let adaptive = "time = { end = 1, step = 'auto' }";
+    let text = own_solver::SCENE.replace("mesh.file = \"block.msh\"", "");
+    let lines = text.lines().filter(|line| !line.starts_with("time"));
+    let text = lines.chain([adaptive]).collect::<Vec<_>>().join("\n");
+    let problem = DiscreteProblem::new(scene(&text), square(4)).unwrap();
+    let session = Session::start(&[]).unwrap();
+    let run = Simulation::new(&problem).law(Box::new(Failing(&FAILED))).run(&session);
+    let message = run.expect_err("the source is refused").to_string();
+    assert!(message.contains("foreign::Failing") && message.contains("NaN"), "{message}");
+    // The three points of one triangle.
+    assert!(FAILED.load(Ordering::Relaxed) <= 3, "{FAILED:?} calls");
 }
 
 /// A solver of another author: it works as one of ours does, or claims to have solved and does nothing.

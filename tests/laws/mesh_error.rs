@@ -97,3 +97,33 @@ fn the_bar_of_the_time_of_failure_covers_the_mesh() {
         assert!(bar < 8.0 * off, "a bar of {bar} for {off} says nothing");
     }
 }
+
+/// A bound that says nothing, or is no bound, is not shown beside a measured error.
+#[test]
+fn a_measured_error_stands_alone_unless_a_proof_says_more() {
+    let line = |measured: f64, bound: Option<f64>, reservations: &[&'static str]| {
+        let mut budget = signorini::evolution::ErrorBudget {
+            displacement_mesh: 0.02,
+            displacement_bound: bound,
+            reservations: reservations.to_vec(),
+            ..Default::default()
+        };
+        budget.set_measured(measured);
+        budget.lines(None)[0].clone()
+    };
+    for (bound, reservations) in
+        [(Some(2.35), &["x"][..]), (Some(2.35), &[]), (Some(0.5), &["x"]), (None, &["x"])]
+    {
+        let shown = line(0.023, bound, reservations);
+        assert_eq!(shown, "from the mesh: u 2.3 % (energy norm, measured)", "{bound:?}");
+    }
+    assert!(
+        line(0.023, Some(0.03), &[])
+            .starts_with("from the mesh: u 2.3 % (measured), at most 3.0 %")
+    );
+    assert!(
+        line(0.0, Some(2.35), &[]).contains("at most 235 %")
+            && line(0.0, Some(2.35), &[]).contains("useless")
+    );
+    assert!(line(0.0, Some(2.35), &["x"]).contains("about 235 %"));
+}

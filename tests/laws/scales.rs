@@ -1,7 +1,10 @@
 //! What counts as large: gaps much wider than displacements, loads that pass zero, and obstacles
 //! on both sides of a node. No right answer is refused.
 
-use crate::support::{close, difference, distorted, history, largest, moved, problem, run, turn};
+use crate::support::{
+    close, close_relative, difference, distorted, history, largest, moved, problem, run, square,
+    try_run, turn,
+};
 use signorini::{
     contact::SOLVERS,
     evolution::DiscreteProblem,
@@ -124,5 +127,41 @@ fn a_tip_between_two_plates_stays_between_them_whichever_way_they_lie() {
                 assert_eq!(at_tip.count(), 2, "each plate has its own gap and pressure");
             }
         }
+    }
+}
+
+/// Numbers whose squares underflow have zero residuals whatever u is: they are refused. Others scale with their units.
+#[test]
+fn what_double_precision_cannot_square_is_refused() {
+    let text = |young: f64, load: f64, top: f64| {
+        format!(
+            "material = {{ young = {young:e}, poisson = 0.3, plane = 'stress' }}
+             boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = 0 }},
+                         {{ name = 'top', {} }}]",
+            match top {
+                0.0 => format!("traction = [0, '{load:e}']"),
+                _ => format!("displacement = ['free', '{top:e}']"),
+            }
+        )
+    };
+    let run = |text: &str| try_run(&problem(square(3), text).unwrap(), SOLVERS[0]);
+    for (young, load, top) in [
+        (1.0, -1e-300, 0.0),
+        (1e5, -1e-170, 0.0),
+        (1e-300, -1e-300, 0.0),
+        (1e-300, 0.0, -1e-3),
+        (1.0, 0.0, -1e-300),
+        (1e100, -1e-99, 0.0),
+    ] {
+        let message = run(&text(young, load, top)).err().map(|error| error.to_string());
+        let message =
+            message.unwrap_or_else(|| panic!("E = {young:e}, {load:e}, {top:e}: no error"));
+        assert!(message.contains("material.young") || message.contains("units"), "{message}");
+    }
+    // Uniform compression σ = −p: u_y = −p/E at the top.
+    for (young, load) in [(1e-60, -1e-60), (1e60, -1e60), (1e-30, -1e-40)] {
+        let found = run(&text(young, load, 0.0)).unwrap_or_else(|error| panic!("{error}"));
+        let top = found.last.state.u.chunks_exact(2).map(|u| -u[1]).fold(0.0, f64::max);
+        close_relative(top, -load / young, 1e-9);
     }
 }

@@ -8,6 +8,18 @@ use signorini::{
     },
     petsc::{Matrix, Pattern, Session, Vector},
 };
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+/// The library sets no allocator: with a second one this would not compile.
+#[global_allocator]
+static OWN: std::alloc::System = std::alloc::System;
 
 const BOTH: [Precision; 2] = [Precision::Preconditioner, Precision::Full];
 
@@ -251,4 +263,35 @@ fn a_factor_is_replaced_when_its_age_has_cost_as_much_as_a_new_one() {
     let mut policy = RefactorisationPolicy::new(8.0);
     solved(&mut policy, 13, 6.0);
     assert!(policy.iteration_limit(6.0).is_none(), "a factor that helps so little is due at once");
+}
+
+/// While an object of PETSc exists, no other thread gets a session, whether or not the session that made it does.
+#[test]
+fn an_object_keeps_the_turn_of_its_session() {
+    let session = turn();
+    let (mut vector, is_gone) = (vector(&session, &DVector::from_element(3, 2.0)), Arc::default());
+    drop(session);
+    let seen: Arc<AtomicBool> = Arc::clone(&is_gone);
+    let other = thread::spawn(move || {
+        let _session = turn();
+        seen.load(Ordering::SeqCst)
+    });
+    // A thread that does not wait has its session meanwhile.
+    thread::sleep(Duration::from_millis(50));
+    // The thread itself may have further sessions, none of which ends PETSc before its objects.
+    let refused = turn().finalize().expect_err("a vector exists").to_string();
+    assert!(refused.starts_with("1 PETSc objects outlive"), "{refused}");
+    vector.write(|values| assert_eq!(values, [2.0; 3])).unwrap();
+    is_gone.store(true, Ordering::SeqCst);
+    drop(vector);
+    assert!(other.join().unwrap(), "the other thread had a session too early");
+}
+
+/// PETSc lends null for no entries, which is no slice.
+#[test]
+fn a_vector_without_entries_has_an_empty_slice() {
+    let session = turn();
+    let mut empty = Vector::zeros(&session, 0).unwrap();
+    assert!(empty.read(<[f64]>::is_empty).unwrap());
+    assert!(empty.write(|values| values.is_empty()).unwrap());
 }

@@ -5,6 +5,7 @@ use crate::{
     ROUNDING,
     contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
     fem::RigidMotion,
+    maximum,
     problem::LoadCase,
 };
 
@@ -65,7 +66,7 @@ impl ContactStep<'_> {
             *r = f - *r;
         }
         partition.comm().sum(&mut sums);
-        let force = sums[0].max(sums[1]).sqrt();
+        let force = maximum(sums[0], sums[1]).sqrt();
         let [.., load, internal] = sums;
         let is_rigid = elastic_max <= self.reference_rounding().max(ROUNDING * rigid_max);
         let [forces, rounding] = match is_rigid && load == 0.0 {

@@ -5,6 +5,7 @@ use crate::{
     ROUNDING,
     evolution::{DiscreteProblem, LoadCurve},
     fem::Body,
+    maximum,
     problem::NEGLIGIBLE_DAMAGE,
     scene::{APART, Stepping},
 };
@@ -171,8 +172,8 @@ impl<'a> ErrorControl<'a> {
             let budget = AIM * self.tolerance * reference;
             added[j] / (STEP_SHARE * (budget - error[j]).max(MIN_REST * budget))
         };
-        let ratio = ratio(0).max(ratio(1));
-        if ratio > 1.0 && self.next_length < f64::INFINITY {
+        let ratio = maximum(ratio(0), ratio(1));
+        if (ratio > 1.0 || ratio.is_nan()) && self.next_length < f64::INFINITY {
             return Err(growth(ratio).max(0.2));
         }
         self.damage = damage;
@@ -188,18 +189,18 @@ impl<'a> ErrorControl<'a> {
     pub(super) fn relative(&self, error: &DVector<f64>) -> f64 {
         let error = self.norms(error);
         let relative = |j: usize| error[j] / self.damage[j].max(NEGLIGIBLE_DAMAGE);
-        relative(0).max(relative(1))
+        maximum(relative(0), relative(1))
     }
 
     /// max |·| over the nodes, and the mean of |·| over the body. Collective.
     fn norms(&self, field: &DVector<f64>) -> [f64; 2] {
-        let (mut max, mut integral) = (0.0_f64, 0.0);
+        let (mut max, mut integral) = (0.0, 0.0);
         let nodes = field
             .iter()
             .zip(&self.body.vertices.weights)
             .take(self.body.vertices.partition.owned());
         for (value, area) in nodes {
-            max = max.max(value.abs());
+            max = maximum(max, value.abs());
             integral += area * value.abs();
         }
         let comm = self.body.vertices.partition.comm();

@@ -284,7 +284,12 @@ impl<'a> StepController<'a> {
         failure: RunError,
     ) -> Result<Decision, RunError> {
         let shorter = match failure {
-            RunError::Step { source: StepFailure::TooShort, .. } => None,
+            // No step is short enough for a wrong law, or for numbers without squares.
+            RunError::Step {
+                source:
+                    StepFailure::TooShort | StepFailure::Source(_) | StepFailure::Unrepresentable { .. },
+                ..
+            } => None,
             RunError::Contact { .. } | RunError::Step { .. } => self.retry(planned, 0.5),
             _ => None,
         };

@@ -1,6 +1,7 @@
 //! The errors of ζ from the time steps, and their growth.
 
 use super::{DamageStep, PlannedStep, RunError, StepController};
+use crate::maximum;
 use nalgebra::DVector;
 
 impl StepController<'_> {
@@ -61,13 +62,13 @@ impl StepController<'_> {
             let growth = |zeta: f64, rate: f64| {
                 let of_laws =
                     laws.iter().map(|law| self.law.error_growth(law, zeta, rate.min(0.0)));
-                of_laws.fold(0.0, f64::max)
+                of_laws.fold(0.0, maximum)
             };
             for i in (0..zeta.len()).filter(|&i| before[i] < 0.0 || rate[i] < 0.0) {
                 let start = growth(self.memory.zeta[i], before[i]);
                 let mut factor = (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
                 if before[i] < 0.0 {
-                    factor = factor.min((rate[i] / before[i]).max(1.0));
+                    factor = -maximum(-factor, -(rate[i] / before[i]).max(1.0));
                 }
                 self.memory.error[i] *= factor;
                 self.memory.doubt[i] *= factor;

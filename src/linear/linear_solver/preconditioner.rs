@@ -9,14 +9,46 @@ use crate::{
         linear_system::{FACTORISATION, PRESCRIPTION, TRIANGULAR_SOLVES},
     },
     petsc::{
-        Matrix, Pattern, PetscError, Session, ShellPreconditioner, Vector, has_option,
-        set_default_option,
+        Communicator, Matrix, Pattern, PetscError, Session, ShellPreconditioner, Vector,
+        has_option, set_default_option,
     },
 };
 use std::iter;
 
 /// PETSC_ERR_MISSING_FACTOR: PETSc lacks the package, or the package lacks this kind of factor.
 const MISSING_FACTOR: i32 = 92;
+
+/// The KSP types that solve the systems of a run with at most three times the triangular solves of conjugate gradients.
+const KSP_TYPES: &[&str] = &[
+    "cg",
+    "groppcg",
+    "pipecg",
+    "pipeprcg",
+    "nash",
+    "stcg",
+    "gltr",
+    "fcg",
+    "pipefcg",
+    "cr",
+    "pipecr",
+    "minres",
+    "gmres",
+    "fgmres",
+    "pipefgmres",
+    "lgmres",
+    "dgmres",
+    "pgmres",
+    "gcr",
+    "pipegcr",
+    "bcgs",
+    "bcgsl",
+    "cgs",
+    "tfqmr",
+    "lcd",
+    "richardson",
+    "preonly",
+    "none",
+];
 
 impl LinearSolver {
     /// Checks the PETSc options with this prefix before the first factorisation. Collective.
@@ -57,7 +89,10 @@ impl LinearSolver {
         let asked = has_option(&format!("-{prefix}pc_type"))?
             || has_option(&format!("-{prefix}pc_factor_mat_solver_type"))?;
         let comm = self.factor.comm();
-        if !comm.any(has_option(&format!("-{prefix}ksp_type"))?) {
+        if comm.any(has_option(&format!("-{prefix}ksp_type"))?) {
+            // Other KSPs than ours lose what single precision rounds.
+            self.factor.set_full_precision();
+        } else {
             self.ksp.set_residual_norm()?;
         }
         // The ranks may have different options.
@@ -79,6 +114,15 @@ impl LinearSolver {
             self.ksp.set_preconditioner(kind, if serial { c"cholmod" } else { c"mumps" })?;
         }
         self.ksp.set_from_options()?;
+        let kind = self.ksp.kind()?;
+        if !KSP_TYPES.contains(&&*kind) {
+            let known = KSP_TYPES.join(", ");
+            return Err(PetscError::ours(format!(
+                "-{prefix}ksp_type {kind} does not serve here: the matrices are symmetric positive definite, and a kept factor \
+                 preconditions them; take one of {known}"
+            )));
+        }
+        self.ignores_reactions = kind == "cg";
         self.ksp.uses_own_factor()
     }
 
@@ -102,7 +146,9 @@ impl LinearSolver {
         self.prepared = false;
         let own = self.uses_factor(system.matrix)?;
         self.prescribe_in_copy(system)?;
-        let matrix = self.modified.as_ref().unwrap_or(system.matrix);
+        let condensed = self.is_condensed(system.matrix)?;
+        let modified = self.modified.as_ref().filter(|_| !condensed);
+        let matrix = modified.unwrap_or(system.matrix);
         let definite = self.ksp.set_up(matrix, &mut self.factor)?;
         if !own {
             self.factor.record(matrix, definite, None)?;
@@ -110,12 +156,12 @@ impl LinearSolver {
         Ok(definite && self.is_ready(system)?)
     }
 
-    /// Prescribes unknowns in a copy of the matrix. A condensed factor needs no copy: it prescribes them
-    /// itself.
+    /// Prescribes unknowns in a copy of the matrix. Conjugate gradients with a condensed factor need no copy: the factor prescribes
+    /// them itself.
     pub(super) fn prescribe_in_copy(&mut self, system: LinearSystem) -> Result<(), PetscError> {
         let before = self.modified.take();
         let Some(prescribed) = system.prescribed else { return Ok(()) };
-        if self.is_condensed(system.matrix)? {
+        if self.is_condensed(system.matrix)? && self.ignores_reactions {
             return Ok(());
         }
         let mut matrix = match before {
@@ -163,8 +209,9 @@ impl LinearSolver {
 /// The factor during a solve, whose applications are timed.
 pub(super) struct TimedFactor<'a> {
     pub(super) factor: &'a mut Factor,
-    /// P⁻¹ r of the first residual, if it is known.
+    /// P⁻¹ r of the first residual, if it is known, and this residual, if the KSP may begin with another vector.
     pub(super) first: Option<&'a Vector>,
+    pub(super) of: Option<&'a Vector>,
     pub(super) system: LinearSystem<'a>,
 }
 
@@ -175,9 +222,17 @@ impl ShellPreconditioner for TimedFactor<'_> {
     }
 
     fn apply(&mut self, r: &Vector, z: &mut Vector) -> Result<(), PetscError> {
-        if let Some(first) = self.first.take() {
+        if let Some(first) = self.first.take()
+            && self.of.is_none_or(|of| is_same(self.factor.comm(), of, r))
+        {
             return z.axpby(1.0, first, 0.0);
         }
         self.system.timed(TRIANGULAR_SOLVES, 1.0, || self.factor.apply(r, z))
     }
+}
+
+/// Are the vectors equal on all ranks? Collective.
+fn is_same(comm: Communicator, a: &Vector, b: &Vector) -> bool {
+    let same = a.read(|a| b.read(|b| a == b));
+    comm.all(matches!(same, Ok(Ok(true))))
 }

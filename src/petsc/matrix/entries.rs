@@ -1,8 +1,11 @@
 //! Reading and writing the stored entries of a matrix in place.
 
 use super::{Matrix, Pattern};
-use crate::petsc::{PetscError, Session, check, options, raw, vector::same_size};
-use std::{ptr, slice};
+use crate::petsc::{
+    PetscError, Session, check, options, raw,
+    vector::{lent, lent_mut, same_size},
+};
+use std::ptr;
 
 impl Matrix {
     /// A matrix without values, otherwise as by [`Self::with_pattern`], and per entry of the pattern its
@@ -61,7 +64,7 @@ impl Matrix {
         // within their own calls.
         unsafe {
             check(raw::MatSeqAIJGetArray(block, &mut data))?;
-            writer(if count > 0 { slice::from_raw_parts_mut(data, count) } else { &mut [] });
+            writer(lent_mut(data, count));
             check(raw::MatSeqAIJRestoreArray(block, &mut data))
         }
     }
@@ -75,7 +78,7 @@ impl Matrix {
             // SAFETY: a live block, which lends `count` values until they are restored.
             unsafe {
                 check(raw::MatSeqAIJGetArrayRead(block, &mut data))?;
-                (count > 0).then(|| values.extend(slice::from_raw_parts(data, count)));
+                values.extend(lent(data, count));
                 check(raw::MatSeqAIJRestoreArrayRead(block, &mut data))?;
             }
         }

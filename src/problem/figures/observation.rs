@@ -105,6 +105,8 @@ impl<'a> Observation<'a> {
 
 /// The largest of the values of all ranks, with its place, m. Collective.
 pub(crate) fn greatest(comm: Communicator, values: impl Iterator<Item = (f64, [f64; 2])>) -> Value {
+    // The total order has a NaN with a sign below all numbers.
+    let values = values.map(|(value, at)| (if value.is_nan() { f64::NAN } else { value }, at));
     let own = values.max_by(|a, b| a.0.total_cmp(&b.0));
     let (least, rank) = comm.min_with_rank(own.map_or(f64::INFINITY, |(value, _)| -value));
     let at = own.map_or([0.0; 2], |(_, at)| at).map(|x| comm.broadcast(rank, x));

@@ -25,9 +25,13 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// The bar over the scale.
+    /// The bar over the scale; infinite if it is no number.
     pub fn relative(&self) -> f64 {
-        if self.bar > 0.0 { self.bar / self.scale } else { 0.0 }
+        match self.bar / self.scale {
+            _ if self.bar == 0.0 => 0.0,
+            relative if relative.is_nan() => f64::INFINITY,
+            relative => relative,
+        }
     }
 }
 
