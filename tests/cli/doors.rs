@@ -551,10 +551,12 @@ fn a_report_that_is_killed_leaves_no_processes() {
         let mut command = directory.command(&["report", &folder]);
         let mut child =
             command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
-        wait_until("processes that draw", || alive() > 1);
+        wait_until(&mut child, "processes that draw", || alive() > 1);
         signal(child.id(), name);
         child.wait().expect("it ends");
-        wait_until("the end of all processes", || alive() == 0);
+        while alive() > 0 {
+            sleep(Duration::from_millis(20));
+        }
     }
 }
 
