@@ -243,7 +243,8 @@ fn a_count_that_the_file_does_not_keep_is_refused_in_every_version() {
                 let mut other = words.clone();
                 let changed = (count + change).to_string();
                 other[place] = &changed;
-                let other = [&lines[..=at], &[&*other.join(" ")], &lines[at + 2..]].concat();
+                let other = other.join(" ");
+                let other = [&lines[..=at], &[&*other], &lines[at + 2..]].concat();
                 let message = read_bytes(other.join("\n")).unwrap_err().to_string();
                 assert!(
                     message.contains("x.msh:") && message.contains("expected"),
