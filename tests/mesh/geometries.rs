@@ -253,7 +253,7 @@ fn every_scene_has_a_mesh_at_every_size() {
     let scenes = files.filter(|path| path.extension().is_some_and(|kind| kind == "toml"));
     let mut bodies: Vec<_> = scenes
         .map(|path| Scene::read(&path, &[]).unwrap().mesh)
-        .map(|MeshSource { file, mut parameters }| {
+        .map(|MeshSource { file, mut parameters, .. }| {
             parameters.remove("size");
             (file.file_stem().unwrap().to_str().unwrap().to_owned(), parameters)
         })

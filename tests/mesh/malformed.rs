@@ -69,9 +69,7 @@ fn a_mesh_runs_nothing() {
     for before in ["", "\n", "\t"] {
         let comments = format!("{before}$Comments\n{command}$EndComments\n");
         fs::write(&path, comments + &old).unwrap();
-        let mesh = read(&path);
-        assert_eq!(mesh.is_ok(), before.is_empty(), "{mesh:?}");
-        assert!(!ran.exists(), "{before:?}");
+        assert!(read(&path).is_ok() && !ran.exists(), "{before:?}");
     }
 }
 
@@ -243,7 +241,8 @@ fn a_count_that_the_file_does_not_keep_is_refused_in_every_version() {
                 let mut other = words.clone();
                 let changed = (count + change).to_string();
                 other[place] = &changed;
-                let other = [&lines[..=at], &[&*other.join(" ")], &lines[at + 2..]].concat();
+                let other = other.join(" ");
+                let other = [&lines[..=at], &[&*other], &lines[at + 2..]].concat();
                 let message = read_bytes(other.join("\n")).unwrap_err().to_string();
                 assert!(
                     message.contains("x.msh:") && message.contains("expected"),
