@@ -256,6 +256,12 @@ class Reader:
 
     row_nset = row_elset = row_set
 
+    def start_surface(self, block):
+        """An empty surface has a name too."""
+        kind = {"ELEMENT": "side", "NODE": "node"}.get(block.options.get("TYPE", "ELEMENT").upper())
+        if kind:
+            self.scope.sets[kind].setdefault(block["NAME"].upper(), (block["NAME"], []))
+
     def row_surface(self, place):
         words, self.words = self.words, []
         kind, name = self.block.options.get("TYPE", "ELEMENT").upper(), self.block["NAME"]

@@ -1,7 +1,10 @@
 //! Meshes of other programs: their sets are the physical groups of the same mesh from gmsh.
 
 use crate::common::{check_laws, close, curve_length, curved_area, length, triangle_areas};
-use signorini::mesh::{Mesh, Order, distance, load, load_choosing, sorted};
+use signorini::{
+    mesh::{Mesh, Order, bounds, distance, load, load_choosing, sorted},
+    scene::Scene,
+};
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write,
@@ -369,11 +372,14 @@ const FIXTURES: [&str; 7] = [
     "parts/nodes.inc",
 ];
 
+/// Curves of a mesh, and the boxes around them.
+type Boxes<'a> = &'a [(&'a str, [f64; 4])];
+
 /// The box around a curve: x from, y from, x to, y to.
 fn box_of(mesh: &Mesh, name: &str) -> [f64; 4] {
     let curve = mesh.curves.get(name).unwrap_or_else(|| panic!("{name}: {:?}", mesh.curves.keys()));
     let points: Vec<_> = curve.edges.as_flattened().iter().map(|&node| mesh.nodes[node]).collect();
-    let [[x, v], [y, w]] = signorini::mesh::bounds(&points);
+    let [[x, v], [y, w]] = bounds(&points);
     [x, y, v, w]
 }
 
@@ -383,7 +389,7 @@ fn decks_of_every_kind_have_their_sets_in_place() {
     let load = |name: &str, order| load(&folder.path().join(name), &BTreeMap::new(), order);
     let ring = 0.75 * std::f64::consts::PI;
     // A file, its area with curved sides and the error of this, and the boxes of its curves.
-    let cases: [(&str, f64, f64, &[(&str, [f64; 4])]); 6] = [
+    let cases: [(&str, f64, f64, Boxes); 6] = [
         // The instance is moved by (0, 1) and turned by 90° about (0, 1).
         (
             "cae.inp",
@@ -462,6 +468,27 @@ fn decks_of_every_kind_have_their_sets_in_place() {
         ] {
             assert!(notes.contains(part), "`{part}` is not in {notes}");
         }
+    }
+}
+
+#[test]
+fn a_boundary_without_edges_says_what_its_set_has() {
+    let deck = "*NODE\n1\n2, 1.\n3, 1., 1.\n4, 0., 1.\n*ELEMENT, TYPE=CPS4\n1,1,2,3,4\n*NSET, NSET=BASE\n1, 2\n\
+                *NSET, NSET=PIN\n1\n*NSET, NSET=ENDS\n1, 3\n";
+    let mesh = abaqus(deck).unwrap();
+    for (name, words) in [
+        ("PIN", "is a set of 1 node of the body, and a boundary is made of edges (known: BASE)"),
+        ("ENDS", "is a set of 2 nodes of the body, and a boundary is made of edges"),
+        ("TOP", "is no physical curve of the mesh (known: BASE)"),
+    ] {
+        let text = format!(
+            "mesh.file = \"part.inp\"\nmaterial = {{ young = 1, poisson = 0, plane = \"stress\" }}\n\
+             [[boundary]]\nname = \"BASE\"\ndisplacement = [0, 0]\n\
+             [[boundary]]\nname = \"{name}\"\ntraction = [0, 1]\n"
+        );
+        let scene = Scene::parse(&text, Path::new("part.toml"), &[]).unwrap();
+        let message = scene.check_mesh(&mesh).unwrap_err().to_string();
+        assert!(message.contains(words), "`{words}` is not in {message}");
     }
 }
 
