@@ -337,7 +337,7 @@ fn malformed_files_are_refused_with_their_place() {
         ("a.inp", "*INCLUDE, INPUT=lost.inp\n", &["line 1: the file lost.inp does not exist"]),
         ("a.inp", "*PART, NAME=a\n*PART, NAME=b\n", &["line 2: part a has no end above"]),
         ("a.unv", "    -1\n  2411\nx\n", &["a.unv, line 3: `x` is wrong in dataset 2411"]),
-        ("a.vtu", "<VTKFile", &["a.vtu: it cannot be read as .vtu (ParseError", "export it as"]),
+        ("a.vtu", "<VTKFile", &["a.vtu: it cannot be read as .vtu (ReadError", "export it as"]),
         ("a.vtk", "hello\n", &["a.vtk: it cannot be read as .vtk (ReadError: Illegal VTK header)"]),
     ];
     for (name, text, fragments) in cases {

@@ -69,9 +69,7 @@ fn a_mesh_runs_nothing() {
     for before in ["", "\n", "\t"] {
         let comments = format!("{before}$Comments\n{command}$EndComments\n");
         fs::write(&path, comments + &old).unwrap();
-        let mesh = read(&path);
-        assert_eq!(mesh.is_ok(), before.is_empty(), "{mesh:?}");
-        assert!(!ran.exists(), "{before:?}");
+        assert!(read(&path).is_ok() && !ran.exists(), "{before:?}");
     }
 }
 
