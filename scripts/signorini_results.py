@@ -143,13 +143,13 @@ def table(folders, columns=None):
     their bars, as `signorini table` prints them. Its `attrs["units"]` are the units by column."""
     import pandas
 
-    from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
+    from signorini_summaries import columns_of, rows_of, summary_of, unknown
 
     folders = [getattr(folder, "folder", folder) for folder in folders]
-    summaries, columns = [summary_of(folder) for folder in folders], list(columns or COLUMNS)
-    if columns != list(COLUMNS) and (problems := list(unknown(columns, summaries))):
+    summaries = [summary_of(folder) for folder in folders]
+    if problems := list(unknown(columns or [], summaries)):
         raise ValueError("; ".join(problems))
-    rows, units = rows_of(folders, summaries, columns)
+    rows, units = rows_of(folders, summaries, columns or columns_of(summaries))
     frame = pandas.DataFrame(rows)
     for name in frame:
         try:
