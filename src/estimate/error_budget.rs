@@ -56,7 +56,7 @@ fn displacement_error_of(problem: &DiscreteProblem, error: &[f64], state: &State
     let body = &problem.body;
     let (zeta, error) = (problem.zeta_at_points(&state.zeta), body.at_points(error));
     let energies = problem.elasticity.energies(body, &zeta, &state.u);
-    let own = energies.len() / body.triangles.len() * body.own_triangles;
+    let own = body.points_per_triangle() * body.own_triangles;
     let mut sums = [0.0; 2];
     for ((energy, zeta), error) in energies.iter().zip(&zeta).zip(&error).take(own) {
         sums[0] += energy * (error / zeta.max(zeta + error)).powi(2).min(1.0);

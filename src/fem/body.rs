@@ -143,6 +143,14 @@ impl Body {
         if self.quadratic.is_some() { Order::Quadratic } else { Order::Linear }
     }
 
+    /// The number of quadrature points of a triangle, at which there are strains. A rank may have no triangle.
+    pub(crate) fn points_per_triangle(&self) -> usize {
+        match self.order() {
+            Order::Linear => 1,
+            Order::Quadratic => 3,
+        }
+    }
+
     /// Does this rank know all triangles around its owned nodes? Then their parts of ∫ φ_i sum to the value
     /// in the undivided body.
     pub fn is_covered(&self) -> bool {

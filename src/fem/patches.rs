@@ -78,7 +78,7 @@ impl Patches {
             vertices: body.mesh.nodes.clone(),
             triangles: body.mesh.triangles.clone(),
             owned: body.vertices.partition.owned(),
-            per_triangle: samples.len() / body.triangles.len(),
+            per_triangle: body.points_per_triangle(),
             around: (0..=last).map(|material| TrianglesAround::new(body, material)).collect(),
         };
         for material in 0..=last {

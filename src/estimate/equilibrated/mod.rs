@@ -260,7 +260,7 @@ impl<'a> EquilibratedStress<'a> {
     /// Triangle `t` with its strains, its ζ and the forces on it.
     fn loaded(&self, t: usize) -> LoadedTriangle<'_> {
         let (problem, triangle) = (self.problem, &self.triangles[t]);
-        let per_triangle = self.strains.len() / self.triangles.len();
+        let per_triangle = problem.body.points_per_triangle();
         LoadedTriangle {
             frame: Frame::new(triangle.corners),
             d: problem.elasticity.d(&problem.body, t),
@@ -311,7 +311,7 @@ fn stressed(
 ) -> Vec<StressedTriangle> {
     let (body, elasticity) = (&problem.body, &problem.elasticity);
     let strains = body.strains(u);
-    let per_triangle = strains.len() / body.triangles.len();
+    let per_triangle = body.points_per_triangle();
     let vertices = body.node_of_vertex();
     let infinite = Matrix3::repeat(f64::INFINITY);
     let inverse = |of: &Material| of.stiffness().try_inverse().unwrap_or(infinite);
