@@ -8,7 +8,7 @@ use crate::{
 };
 use nalgebra::{DMatrix, DVector};
 use signorini::{
-    contact::{NodalConstraint, RigidMotions, SOLVERS, nonnegative},
+    contact::{NodalConstraint, RigidMotions, RowLaw, SOLVERS, nonnegative},
     evolution::{DiscreteProblem, SetupError},
     fem::{Body, RigidMotion},
     mesh::{Mesh, Order, Refinement},
@@ -242,8 +242,11 @@ fn a_disc_in_a_ring_can_only_turn() {
 fn contact_on_opposite_sides_resists_both_ways_on_one_side_only_one() {
     // Farkas: a load is balanced by p ≥ 0 if no motion that contact allows does work.
     let body = Body::new(square(2), Order::Linear);
-    let gap =
-        |node: usize, direction| NodalConstraint { node, direction, tributary_length: Some(1.0) };
+    let gap = |node: usize, direction| NodalConstraint {
+        node,
+        direction,
+        law: RowLaw::Rigid { tributary_length: 1.0 },
+    };
     let load = |force: [f64; 2]| -> Vec<f64> {
         (0..9).flat_map(|i| if i == 4 { force } else { [0.0; 2] }).collect()
     };
