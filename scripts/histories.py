@@ -10,9 +10,6 @@ from drawing import (
 )
 from results import ROUNDING, UNDAMAGED, ResultError
 
-# Names of abscissas; others are columns of history.csv.
-NAMES = {"time": ("time t", "time"), "displacement_max": ("largest displacement", "length"),
-         "work": ("work of the loads", "work")}
 DASHES = "-", (0, (4, 3)), (0, (1, 2))
 
 
@@ -78,8 +75,8 @@ def draw_forces(runs, names, figure=None):
     else:
         axes.set_ylim(bottom=0.0)
     axes.locator_params("x", nbins=5)
-    name, kind = NAMES.get(over, (over, ""))
-    axes.set_xlabel(f"{name}{times_power(across, runs[0].units.get(kind, ''))}")
+    of = {"label": "time t", "unit": runs[0].units["time"]} if over == "time" else runs[0].summary["figures"].get(over, {})
+    axes.set_xlabel(f"{of.get('label', over)}{times_power(across, of.get('unit', ''))}")
     axes.set_ylabel(f"force{times_power(up, runs[0].units['line'])}")
     legend(axes, below)
     return figure

@@ -151,11 +151,13 @@ def table(folders, columns=None):
     except ImportError:
         raise ImportError("table() needs pandas (Debian: apt install python3-pandas); `signorini table` prints the same") from None
 
+    from signorini_summaries import columns_of, rows_of, summary_of, unknown
+
     folders = [getattr(folder, "folder", folder) for folder in folders]
-    summaries, columns = [summary_of(folder) for folder in folders], list(columns or COLUMNS)
-    if columns != list(COLUMNS) and (problems := list(unknown(columns, summaries))):
+    summaries = [summary_of(folder) for folder in folders]
+    if problems := list(unknown(columns or [], summaries)):
         raise ValueError("; ".join(problems))
-    rows, units = rows_of(folders, summaries, columns)
+    rows, units = rows_of(folders, summaries, columns or columns_of(summaries))
     frame = pandas.DataFrame(rows)
     for name in frame:
         try:

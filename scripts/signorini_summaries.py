@@ -6,9 +6,6 @@ import sys
 from math import inf
 from pathlib import Path
 
-# The columns of a table, by default.
-COLUMNS = ("end_time", "stopped_by", "stopped_at", "zeta_min", "displacement_max", "work",
-           "contact_force", "von_mises_max", "wall_seconds")
 # The ends of columns with the reason why the mesh does not determine an extreme.
 FLAGS = (".singular", ".unresolved")
 # Kinds of units of values that are no figures; "s" and "MB" do not depend on the scene.
@@ -80,6 +77,12 @@ def option_of(summary, name):
     option = f"--{name}"
     return [following if word == option else word.partition("=")[2] for word, following in zip(words, [*words[1:], ""])
             if word == option or word.startswith(f"{option}=")]
+
+
+def columns_of(summaries):
+    """The columns of a table by default: the ends of the runs, and the figures of their whole bodies."""
+    figures = dict.fromkeys(name for summary in summaries for name in summary.get("figures") or {} if "." not in name)
+    return ["end_time", "stopped_by", "stopped_at", *figures, "wall_seconds"]
 
 
 def figure_of(summary, name):

@@ -32,7 +32,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from signorini_files import check, whole
-from signorini_summaries import COLUMNS, rows_of, summary_of, unknown
+from signorini_summaries import columns_of, rows_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
 
 # The column of --cases that names the runs.
@@ -292,7 +292,7 @@ def main(prog=None):
     failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs,
                      arguments.columns or [])
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
-    rows, units = rows_of(folders, summaries, arguments.columns or COLUMNS, list(map(dict, chosen)))
+    rows, units = rows_of(folders, summaries, arguments.columns or columns_of(summaries), list(map(dict, chosen)))
     printed(rows, units)
     with whole(out / "study.csv", is_of_study) as part:
         write_table(rows, part, units)

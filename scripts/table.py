@@ -10,7 +10,7 @@ import csv
 import sys
 
 from bars import barred, plain
-from signorini_summaries import COLUMNS, FLAGS, flag_of, folders_of, named, rows_of, summary_of, unknown
+from signorini_summaries import FLAGS, columns_of, flag_of, folders_of, named, rows_of, summary_of, unknown
 
 
 def text_of(value):
@@ -92,7 +92,8 @@ def main(prog=None):
             print(f"error: {error}", file=sys.stderr)
             failed = True
     if found:
-        printed(*rows_of(found, found.values(), arguments.columns or COLUMNS), arguments.csv)
+        columns = arguments.columns or columns_of(found.values())
+        printed(*rows_of(found, found.values(), columns), arguments.csv)
         failed |= refused(arguments.columns, found.values())
     return 2 if failed else 0
 

@@ -6,9 +6,8 @@ use serde_json::json;
 use signorini::{
     contact::Bound,
     estimate::Simulation,
-    evolution::{RunError, Step},
+    evolution::{Choices, RunError, Step},
     fem::{DamageSystem, NodalBases, Stiffness, source, source_load},
-    model::Fremond,
     output::{check_is_own, create, terminal::say, write_whole},
     petsc::{Matrix, PetscError, Session},
     problem::{DiscreteProblem, LoadCase, State},
@@ -174,8 +173,13 @@ fn files(
     if let (Some(laws), Some(before)) = (problem.damage(), states.get(1)) {
         let mass = problem.mass();
         let system = DamageSystem::new(session, body, mass, &problem.diffusions(), 1.0)?;
-        let phi = source(body, (&Fremond, laws), &body.strains(&before.u), &before.zeta)
-            .map_err(Failure::input)?;
+        let phi = source(
+            body,
+            (&Choices::of(problem.scene()).source, laws),
+            &body.strains(&before.u),
+            &before.zeta,
+        )
+        .map_err(Failure::input)?;
         files.extend([
             ("M.mtx", square(&system.mass)?),
             ("L.mtx", square(&system.laplace)?),

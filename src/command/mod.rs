@@ -92,7 +92,7 @@ fn check_petsc(options: &[String]) -> Result<(), Failure> {
     }
     match options.windows(2).find(|pair| pair[0] == "-tao_type") {
         Some([_, kind]) if !TAO_TYPES.contains(&kind.as_str()) => Err(Failure::input(format!(
-            "-tao_type: `{kind}` is none of TAO's types for bounds: {}",
+            "-tao_type: `{kind}` is none of TAO's types that solve contact problems: {}",
             TAO_TYPES.join(", ")
         ))),
         _ => Ok(()),

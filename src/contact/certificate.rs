@@ -135,7 +135,7 @@ impl Certificate {
                     node: at.node,
                     normal: gap.direction,
                     force,
-                    pressure: gap.tributary_length.filter(|_| active).map_or(0.0, |l| force / l),
+                    pressure: gap.law.resists().filter(|_| active).map_or(0.0, |l| force / l),
                     gap: *left,
                     active,
                 });

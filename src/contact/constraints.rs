@@ -1,6 +1,6 @@
 //! From directions and values at nodes to nodal bases, prescribed unknowns and bounds.
 
-use super::{Bound, Conflict, ConstraintError, NodalConstraint};
+use super::{Bound, Conflict, ConstraintError, NodalConstraint, RowLaw};
 use crate::{
     ROUNDING,
     fem::{NodalBases, Subdomain},
@@ -111,6 +111,10 @@ impl Constraints {
             gap.direction = along(basis[line], gap.direction);
         }
         let (normal, dof) = (gap.direction, |line: usize| 2 * gap.node + line);
+        let tributary_length = match gap.law {
+            RowLaw::Prescribed => return Ok(()),
+            RowLaw::Rigid { tributary_length } => tributary_length,
+        };
         let bounded = match line {
             _ if prescribed == 2 => None,
             Some(line) if line < prescribed => None,
@@ -122,7 +126,7 @@ impl Constraints {
                     normal,
                     lower: f64::NEG_INFINITY,
                     upper: value,
-                    tributary_length: gap.tributary_length.unwrap_or(0.0),
+                    tributary_length,
                 });
                 self.first.push(number);
                 basis.push(normal);

@@ -22,7 +22,7 @@ pub use certificate::{Answer, Certificate, ContactPoint};
 pub use constraints::Constraints;
 pub use error::{Conflict, ConstraintError, ContactError};
 pub use kkt::{Kkt, Scales};
-pub use nodal_constraint::{Bound, NodalConstraint};
+pub use nodal_constraint::{Bound, NodalConstraint, RowLaw};
 pub use problem::ContactProblem;
 pub use rigid::{DrivenMotion, RigidMotions, nonnegative};
 pub(crate) use rigid::{least_motion, rigid_motion_until_contact, unconstrained_motions};

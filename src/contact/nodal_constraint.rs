@@ -1,21 +1,43 @@
 //! Displacement conditions at nodes, as in the scene and as bounds on unknowns.
 
-/// A constraint on the displacement u of a node, a row of the constraint matrix. Its value may depend on time. u·d is
-/// prescribed (a component, or 0 across a symmetry axis), or at a node of Γ_C u·d is at most the gap, with d = ν.
+/// A condition on the displacement u of a node along d, a row of the constraint matrix. Its value v may depend on time.
 #[derive(Debug, Clone, Copy)]
 pub struct NodalConstraint {
     /// The node.
     pub node: usize,
-    /// d, a unit vector.
+    /// d, a unit vector; ν at a gap.
     pub direction: [f64; 2],
-    /// The node's tributary length of Γ_C, m; `None` where u·d is prescribed.
-    pub tributary_length: Option<f64>,
+    /// The law between u·d, v and the reaction.
+    pub law: RowLaw,
+}
+
+/// The law of a row. A match on it has no `_` arm, so that the compiler names the places that a further law concerns.
+#[derive(Debug, Clone, Copy)]
+pub enum RowLaw {
+    /// u·d = v: a component, or 0 across a symmetry axis. The balance of forces determines the reaction, of either sign.
+    Prescribed,
+    /// A rigid obstacle at the gap v: u·d ≤ v, p ≥ 0, p (v − u·d) = 0. The balance of forces determines p. The row adds
+    /// nothing to K: it bounds an unknown.
+    Rigid {
+        /// The node's tributary length of Γ_C, m.
+        tributary_length: f64,
+    },
+}
+
+impl RowLaw {
+    /// The tributary length of a row that resists motions along d in one sense; `None` if it prevents them.
+    pub fn resists(self) -> Option<f64> {
+        match self {
+            Self::Prescribed => None,
+            Self::Rigid { tributary_length } => Some(tributary_length),
+        }
+    }
 }
 
 impl NodalConstraint {
     /// Is it the condition of a gap?
     pub fn is_gap(&self) -> bool {
-        self.tributary_length.is_some()
+        self.law.resists().is_some()
     }
 }
 

@@ -24,8 +24,8 @@ pub struct ContactProblem<'a> {
     pub load: &'a Vector,
     /// The bounded unknowns of this rank, in increasing order of `dof`.
     pub bounds: &'a [Bound],
-    /// u·ν of the rigid motions that contact alone constrains, one row per bound. Without columns K is
-    /// positive definite.
+    /// u·ν of the null space of K, one row per bound: rigid motions that contact alone constrains. Without columns K is positive
+    /// definite.
     pub rigid: &'a DMatrix<f64>,
     /// The work of the load on each of these motions.
     pub work: &'a DVector<f64>,

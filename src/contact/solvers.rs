@@ -135,7 +135,14 @@ pub const REGISTRY: &[SolverEntry] =
     &[active_set::ACTIVE_SET, penalty_duality::PENALTY_DUALITY, tao::TAO];
 
 /// Their names.
-pub const SOLVERS: [&str; 3] = [REGISTRY[0].name, REGISTRY[1].name, REGISTRY[2].name];
+pub const SOLVERS: [&str; REGISTRY.len()] = {
+    let (mut names, mut i) = ([""; REGISTRY.len()], 0);
+    while i < names.len() {
+        names[i] = REGISTRY[i].name;
+        i += 1;
+    }
+    names
+};
 
 /// There is no contact solver of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -192,7 +199,7 @@ fn names() -> Vec<String> {
     REGISTRY.iter().flat_map(of).collect()
 }
 
-/// The chosen solver, and the one that replaces it if it stops above the tolerance: for a solver of another author
+/// The chosen solver, then the one that replaces it if it stops above the tolerance: for a solver of another author
 /// the default one. A variant has no replacement, so that its own result is seen, and `rescue = false` forbids one.
 /// Without bounds every choice means one linear solve, by the active set method.
 ///
@@ -200,9 +207,9 @@ fn names() -> Vec<String> {
 /// There is none of that name.
 pub fn solvers(
     chosen: &ChosenSolver,
-    bounded: bool,
+    has_bounds: bool,
     options: &ContactOptions,
-) -> Result<(SharedSolver, Option<SharedSolver>), SolverError> {
+) -> Result<Vec<SharedSolver>, SolverError> {
     let named = |name| find(name).map(|(entry, variant)| (entry.construct)(variant, options));
     let (solver, rescuer) = match chosen {
         ChosenSolver::Own(solver) => (Rc::clone(solver), Some(SOLVERS[0])),
@@ -211,8 +218,9 @@ pub fn solvers(
             (named(name)?, entry.rescuer.filter(|_| variant.is_empty()))
         }
     };
-    if !bounded {
-        return Ok((Rc::new(ActiveSet { name: "linear" }), None));
+    if !has_bounds {
+        return Ok(vec![Rc::new(ActiveSet { name: "linear" })]);
     }
-    Ok((solver, rescuer.filter(|_| options.rescue).map(named).transpose()?))
+    let rescuer = rescuer.filter(|_| options.rescue).map(named).transpose()?;
+    Ok([solver].into_iter().chain(rescuer).collect())
 }

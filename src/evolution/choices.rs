@@ -2,7 +2,7 @@
 
 use crate::{
     contact::{ChosenSolver, ContactSolver},
-    model::DamageSource,
+    model::{ChosenSource, DamageSource},
     scene::Scene,
 };
 use std::rc::Rc;
@@ -12,19 +12,20 @@ use std::rc::Rc;
 #[derive(Clone)]
 pub struct Choices {
     pub(crate) solver: ChosenSolver,
-    /// The damage source that another author wrote; `None` for the paper's source.
-    pub(crate) source: Option<Rc<dyn DamageSource>>,
+    /// The damage source.
+    pub source: ChosenSource,
 }
 
 impl Choices {
-    /// The solver that the scene names, or the default one, and the paper's damage source.
+    /// The solver that the scene names, or the default one, and the paper's damage source. A scene that names its damage
+    /// source would choose it here.
     pub fn of(scene: &Scene) -> Self {
         Self::named(scene.contact.solver_name())
     }
 
     /// The solver called `name` and the paper's damage source. A run tells whether there is a solver of this name.
     pub fn named(name: &str) -> Self {
-        Self { solver: ChosenSolver::Named(name.to_owned()), source: None }
+        Self { solver: ChosenSolver::Named(name.to_owned()), source: ChosenSource::Fremond }
     }
 
     /// These choices with the contact solver called `name`.
@@ -42,6 +43,6 @@ impl Choices {
     /// These choices with a damage source that another author wrote.
     #[must_use]
     pub fn law(self, source: Box<dyn DamageSource>) -> Self {
-        Self { source: Some(Rc::from(source)), ..self }
+        Self { source: ChosenSource::Own(Rc::from(source)), ..self }
     }
 }

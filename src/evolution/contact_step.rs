@@ -10,18 +10,29 @@
 //!   the step and its reason.
 //! - Callers: the loop over the steps in `evolution`, which then accepts the step or tries a shorter one.
 //!
-//! The way of one step: [`ContactStep::solve`] lets the chosen solver try, then perhaps the rescuer (`rescue`). A try
-//! starts from the extrapolated accepted steps (`start`), solves (`minimisation`), has the answer certified
-//! (`certificate`), and repeats from a moved reference or to a smaller tolerance where rounding is the reason
-//! (`attempts`). Of many answers it returns the one of least displacement (`one_of_many`).
-
+//! The way of one step is [`ContactStep::solve`]: solve (`minimisation`), certify (`certificate`), decide (`decision`). An
+//! [`Attempt`] says from where its solver starts, and with which tolerance. The decision accepts its answer, changes one thing for the next
+//! attempt, or gives up with a reason. Of many answers the step takes the one of least displacement (`one_of_many`).
+//!
+//! What is tried again, and the input that needs it. Each has a test in `tests`:
+//!
+//! | place | what changes | for which input |
+//! |---|---|---|
+//! | `decision` | the reference: it moves with a mostly rigid answer | a body that falls through a wide gap |
+//! | `decision` | the load: the residual forces of the answer before; the tolerance | slender bodies, whose last digits bend them |
+//! | `decision` | the solver: the rescuer, from the accepted steps | a fixed point that is slow where nothing stops a rotation |
+//! | `one_of_many` | the contact forces that count as residuals | a body that rests on one point |
+//! | `StepController::decide_failure` | the length of an adaptive step | contact that a solver with few iterations loses |
+//! | `contact/solvers/active_set.rs` | all unknowns in place of the condensed ones | an active set that leaves the small problem singular |
+//! | `contact/solvers/tao.rs` | the unit of displacements, and the centre of the proximal term | a body that contact alone supports |
+//! | `linear/linear_solver.rs` | the factor: a new one of the present K | damage that has grown since the factor was made |
+//! | `accuracy/first_mesh.rs` | the size of the first mesh | curved sides of a hole that fold coarse triangles |
 mod accuracy;
-mod attempts;
 mod certificate;
-mod reference;
+mod decision;
 mod minimisation;
 mod one_of_many;
-mod rescue;
+mod reference;
 
 pub use accuracy::Accuracy;
 use certificate::active_bounds;
@@ -38,6 +49,7 @@ use crate::{
     problem::SHOWN_AS_ZERO,
 };
 use certificate::Candidate;
+use decision::{Attempt, Decision};
 use minimisation::displacement;
 use nalgebra::{DMatrix, DVector};
 use reference::Reference;
@@ -49,10 +61,9 @@ pub struct ContactStep<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
     phases: &'a Phases,
-    solver: SharedSolver,
-    /// The solver for steps in which `solver` stops short of the tolerance.
-    rescuer: Option<SharedSolver>,
-    /// Solves the linear systems of both solvers.
+    /// The chosen solver, then the one for steps in which it stops short of the tolerance, if there is one.
+    solvers: Vec<SharedSolver>,
+    /// Solves the linear systems of all solvers.
     elastic: LinearSolver,
     stiffness: Stiffness,
     /// η_*(ζ) at the quadrature points, with which K was assembled.
@@ -60,14 +71,14 @@ pub struct ContactStep<'a> {
     /// The load of the free unknowns, and these unknowns c.
     load: Vector,
     c: Vector,
-    /// The memory from which every solve starts, and its update in case the step is accepted.
+    /// The data from which every solve starts, and their update in case the step is accepted.
     accepted: AcceptedState,
     next: AcceptedState,
     /// c of the accepted steps.
     extrapolation: Extrapolation,
     /// Does every rank know all triangles around its own nodes?
     covered: bool,
-    /// u·ν at the bounds, one column per rigid motion that only contact constrains.
+    /// u·ν at the bounds, one column per rigid motion in the null space of K.
     rigid: DMatrix<f64>,
 }
 
@@ -119,11 +130,11 @@ impl<'a> ContactStep<'a> {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
         let options = &problem.scene().contact;
-        let bounded = comm.any(!constraints.bounds.is_empty());
-        let (solver, rescuer) = contact::solvers(&choices.solver, bounded, options)?;
+        let has_bounds = comm.any(!constraints.bounds.is_empty());
+        let solvers = contact::solvers(&choices.solver, has_bounds, options)?;
         // A preconditioner needs only single precision, which halves the bytes to read.
         let precision = Precision::Preconditioner;
-        let memory = AcceptedState {
+        let accepted = AcceptedState {
             reference: Reference::default(),
             scales: Scales { force: MIN_LOAD * problem.largest_load, displacement: 0.0 },
             forces: 0.0,
@@ -134,15 +145,14 @@ impl<'a> ContactStep<'a> {
             session,
             problem,
             phases,
-            solver,
-            rescuer,
+            solvers,
             elastic: LinearSolver::new(session, contact::ELASTIC, unknowns, precision)?,
             stiffness,
             zeta_at_points: body.at_points(&vec![1.0; body.mesh.nodes.len()]),
             load: Vector::zeros(session, unknowns)?,
             c: Vector::zeros(session, unknowns)?,
-            next: memory.clone(),
-            accepted: memory,
+            next: accepted.clone(),
+            accepted,
             extrapolation: Extrapolation::default(),
             covered: comm.all(body.is_covered()),
             rigid: problem.motions.normal_at(body, &constraints.bounds),
@@ -154,50 +164,92 @@ impl<'a> ContactStep<'a> {
         self.accepted.warm_start = warm_start.to_vec();
     }
 
-    /// u_n at `time` for the nodal damage `zeta`, by the current solver. Every solve starts from the accepted steps, and from
-    /// their warm start if it `is_warm`. A rejected step leaves K and the factor of K alone behind. The next solve
-    /// replaces K; another factor changes answers within the tolerance, and the iterations of a method.
-    fn solve_by_one(
-        &mut self,
-        step: usize,
-        time: f64,
-        zeta: &[f64],
-        is_warm: bool,
-    ) -> Result<Step, RunError> {
+    /// u_n at `time` for the nodal damage `zeta`. Every solve starts from the accepted steps. A rejected step leaves K and the
+    /// factor of K alone behind. The next solve replaces K; another factor changes answers within the tolerance, and the
+    /// iterations of a method.
+    ///
+    /// # Errors
+    /// The solver failed, or neither its answers nor its rescuer's met the KKT tolerance.
+    pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
         let (problem, phases) = (self.problem, self.phases);
-        let (comm, zeta_at_points) =
-            (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
-        if comm.any(zeta_at_points != self.zeta_at_points) {
-            phases.time("stiffness", || {
+        self.set_damage(zeta);
+        let comm = problem.body.nodes.partition.comm();
+        let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
+        let mut attempt = self.first_attempt(0, &case)?;
+        let candidate = loop {
+            let decision = match self.minimise(&mut attempt, &case) {
+                Ok((u, stopped)) => {
+                    let reference = &attempt.next.reference;
+                    let candidate =
+                        phases.time("certificate", || self.certify(reference, u, &case));
+                    self.decide(attempt, stopped, candidate, &case)?
+                }
+                Err(error) => self.give_up(attempt, error, &case)?,
+            };
+            match decision {
+                Decision::Accept(accepted, candidate) => {
+                    attempt = accepted;
+                    break candidate;
+                }
+                Decision::Again(changed) => attempt = changed,
+                Decision::GiveUp(source) => {
+                    return Err(RunError::contact(problem, step, time, source));
+                }
+            }
+        };
+        let candidate = self.of_minimum_displacement(&mut attempt.next, candidate, &case)?;
+        self.step_of(attempt, candidate, (step, &case, zeta), started)
+    }
+
+    /// K(ζ) for the nodal damage `zeta`, unless K is already that of this damage. Collective.
+    fn set_damage(&mut self, zeta: &[f64]) {
+        let problem = self.problem;
+        let zeta_at_points = problem.zeta_at_points(zeta);
+        if problem.body.nodes.partition.comm().any(zeta_at_points != self.zeta_at_points) {
+            self.phases.time("stiffness", || {
                 self.stiffness.set_damage(&problem.body, &zeta_at_points);
             });
             self.zeta_at_points = zeta_at_points;
         }
-        let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
-        self.start(&case)?;
-        if !is_warm {
-            self.next.warm_start.clear();
+    }
+
+    /// The step of an accepted answer, and the data that it passes to the next step.
+    fn step_of(
+        &mut self,
+        attempt: Attempt,
+        candidate: Candidate,
+        (step, case, zeta): (usize, &LoadCase, &[f64]),
+        started: Instant,
+    ) -> Result<Step, RunError> {
+        let (problem, time) = (self.problem, case.time);
+        let Attempt { mut next, mut report, solver, .. } = attempt;
+        if solver > 0 {
+            report.rescued_by = Some(self.solvers[solver].name());
+            report.fallbacks += 1;
+            // The chosen solver cannot use the rescuer's warm start in the next step.
+            next.warm_start.clear();
         }
-        let (candidate, report) = self.solve_certified(step, &case)?;
         self.check_scales(&candidate).map_err(|source| RunError::Step { step, time, source })?;
         let Candidate { u, kkt, scales, force, unbalanced, mut contact, prescribed, .. } =
             candidate;
-        self.next.scales = scales;
+        next.scales = scales;
         let forces = self.accepted.forces.max(candidate.forces);
-        self.next.forces = forces;
+        next.forces = forces;
         // Contact without force is rounding.
         let rounding = candidate.rounding.max(SHOWN_AS_ZERO * forces);
         for point in contact.iter_mut().filter(|point| point.force <= rounding) {
             (point.active, point.pressure) = (false, 0.0);
         }
         let limit = problem.tolerance * scales.force;
-        self.next.active = active_bounds(&problem.constraints, &contact, limit);
+        next.active = active_bounds(&problem.constraints, &contact, limit);
         let unconstrained = self.unconstrained_motion(&contact, force);
-        let u = self.next.reference.total(u);
+        let u = next.reference.total(u);
+        self.next = next;
         let mut state = State { time, u, zeta: zeta.to_vec(), contact, prescribed };
         problem.share_reactions(&mut state, &unbalanced, rounding);
-        let (observation, figures) = phases
+        let (observation, figures) = self
+            .phases
             .time("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
         let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);
         record.seconds = started.elapsed().as_secs_f64();
@@ -255,45 +307,52 @@ impl<'a> ContactStep<'a> {
         self.elastic.factor().set_state(factor);
     }
 
-    /// Starts from the accepted steps: sets c, the reference and the solver's warm start. If the active bounds do
-    /// not support the body, the load drives it as a rigid body until contact, and the reference follows.
-    fn start(&mut self, case: &LoadCase) -> Result<(), PetscError> {
+    /// The first attempt by a solver: sets c, the reference and the warm start, all from the accepted steps. If the active
+    /// bounds do not support the body, the load drives it as a rigid body until contact, and the reference follows.
+    fn first_attempt(&mut self, solver: usize, case: &LoadCase) -> Result<Attempt, PetscError> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let constraints = &problem.constraints;
-        self.next = self.accepted.clone();
-        let AcceptedState { reference, active, .. } = &mut self.next;
+        let mut next = self.accepted.clone();
         let unloaded =
             comm.all(case.load.iter().chain(&case.c_prescribed).all(|&value| value == 0.0));
         if unloaded {
-            *reference = Reference::default();
+            next.reference = Reference::default();
+        }
+        if solver > 0 {
+            // It cannot use the warm start of another solver.
+            next.warm_start.clear();
         }
         self.phases.time("extrapolation", || {
             let predicted = self.extrapolation.at(case.time);
             let mut c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
-            reference.translate(constraints, &mut c, -1.0);
+            next.reference.translate(constraints, &mut c, -1.0);
             self.c.set(&c)
         })?;
-        if !unloaded && !contact::unconstrained_motions(comm, &self.rigid, active).is_empty() {
-            let (motions, mut active) = ((&self.rigid, &case.work), active.clone());
-            let (bounds, c) = self.at_bounds(case)?;
+        if !unloaded && !contact::unconstrained_motions(comm, &self.rigid, &next.active).is_empty()
+        {
+            let (motions, mut active) = ((&self.rigid, &case.work), next.active.clone());
+            let (bounds, c) = self.at_bounds(&next.reference, case)?;
             let amplitudes =
                 contact::rigid_motion_until_contact(comm, motions, &bounds, &c, &mut active, false);
-            self.move_rigidly(&amplitudes);
+            self.move_rigidly(&mut next.reference, &amplitudes);
         }
-        Ok(())
+        Ok(Attempt::first(solver, problem.tolerance, next))
     }
 
-    /// The bounds, measured from the reference, and c there.
-    fn at_bounds(&self, case: &LoadCase) -> Result<(Vec<Bound>, Vec<f64>), PetscError> {
-        let (_, bounds) =
-            self.next.reference.prescribed_and_bounds(&self.problem.constraints, case);
+    /// The bounds, measured from a reference, and c there.
+    fn at_bounds(
+        &self,
+        reference: &Reference,
+        case: &LoadCase,
+    ) -> Result<(Vec<Bound>, Vec<f64>), PetscError> {
+        let (_, bounds) = reference.prescribed_and_bounds(&self.problem.constraints, case);
         let c = self.c.read(|c| bounds.iter().map(|b| c[b.dof]).collect())?;
         Ok((bounds, c))
     }
 
-    /// Adds the motions that contact alone constrains, with these amplitudes, to the reference.
-    fn move_rigidly(&mut self, amplitudes: &DVector<f64>) {
+    /// Adds the motions that contact alone constrains, with these amplitudes, to a reference.
+    fn move_rigidly(&self, reference: &mut Reference, amplitudes: &DVector<f64>) {
         let DiscreteProblem { motions, body, constraints, .. } = self.problem;
-        self.next.reference.add(constraints, &motions.combined(body, amplitudes).field(body));
+        reference.add(constraints, &motions.combined(body, amplitudes).field(body));
     }
 }

@@ -4,7 +4,7 @@ use super::{DiscreteProblem, Phases, RunError, Step, StepFailure, agreed};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     linear::FactorState,
-    model::{DamageSource, Fremond},
+    model::ChosenSource,
     petsc::{PetscError, Session},
 };
 use nalgebra::DVector;
@@ -45,8 +45,7 @@ pub(crate) struct DamageStep<'a> {
     pub(crate) session: &'a Session,
     pub(crate) problem: &'a DiscreteProblem,
     pub(crate) phases: &'a Phases,
-    /// The damage source that another author wrote; `None` for the paper's source.
-    pub(crate) law: Option<&'a dyn DamageSource>,
+    pub(crate) law: &'a ChosenSource,
     /// k and M + kκL, made by the first step that needs it.
     pub(crate) system: Option<(f64, DamageSystem)>,
     /// The factor of a checkpoint for that system.
@@ -88,11 +87,7 @@ impl DamageStep<'_> {
         };
         self.phases.time("damage source", || {
             let comm = body.vertices.partition.comm();
-            // The paper's source becomes part of the loop over the triangles.
-            let phi = match self.law {
-                Some(law) => fem::source(body, (law, laws), &strains, &state.zeta),
-                None => fem::source(body, (&Fremond, laws), &strains, &state.zeta),
-            };
+            let phi = fem::source(body, (self.law, laws), &strains, &state.zeta);
             let failed = |source| RunError::Step {
                 step: step.record.step,
                 time: state.time,

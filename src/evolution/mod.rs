@@ -55,7 +55,7 @@ pub(crate) use step_controller::StepController;
 
 use crate::{
     linear::FactorState,
-    model::Fremond,
+    model::ChosenSource,
     petsc::{Communicator, Session},
     problem::{LoadCase, LoadCurve},
 };
@@ -79,8 +79,8 @@ pub(crate) fn all_steps<'a>(
     saved: Option<RunState>,
     followed: &'a [f64],
 ) -> Result<Run<'a>, RunError> {
-    let law = choices.source.as_deref();
-    if law.is_some() && problem.damage().is_none() {
+    let law = &choices.source;
+    if matches!(law, ChosenSource::Own(_)) && problem.damage().is_none() {
         return Err(RunError::NoDamage);
     }
     let damage_step = DamageStep { session, problem, phases, law, system: None, loaded: None };
@@ -93,7 +93,7 @@ pub(crate) fn all_steps<'a>(
         contact_step.accept(start)?;
         source = damage_step.source(&mut first)?;
     }
-    let controller = StepController::new(problem, law.unwrap_or(&Fremond), &zeta, source, followed);
+    let controller = StepController::new(problem, law, &zeta, source, followed);
     let outcome = Outcome::new(first, problem);
     let mut run = Run { damage_step, contact_step, controller, outcome };
     match saved {

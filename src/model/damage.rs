@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::Deserialize;
+use std::rc::Rc;
 
 /// A point of the body at which the source φ is evaluated.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +44,33 @@ impl DamageSource for Fremond {
     #[inline]
     fn source(&self, point: &DamagePoint) -> f64 {
         point.law.source(point.strain, point.zeta)
+    }
+}
+
+/// The damage source of a run. A scene gets its own by `Choices::of`.
+#[derive(Clone)]
+pub enum ChosenSource {
+    /// The paper's.
+    Fremond,
+    /// A source that another author wrote.
+    Own(Rc<dyn DamageSource>),
+}
+
+impl DamageSource for ChosenSource {
+    /// The source is the same in all calls, so that the paper's becomes part of a loop over triangles.
+    #[inline]
+    fn source(&self, point: &DamagePoint) -> f64 {
+        match self {
+            Self::Fremond => Fremond.source(point),
+            Self::Own(source) => source.source(point),
+        }
+    }
+
+    fn error_growth(&self, law: &DamageLaw, zeta: f64, rate: f64) -> f64 {
+        match self {
+            Self::Fremond => Fremond.error_growth(law, zeta, rate),
+            Self::Own(source) => source.error_growth(law, zeta, rate),
+        }
     }
 }
 

@@ -5,5 +5,5 @@
 mod damage;
 mod elasticity;
 
-pub use damage::{DamageLaw, DamagePoint, DamageSource, Fremond};
+pub use damage::{ChosenSource, DamageLaw, DamagePoint, DamageSource, Fremond};
 pub use elasticity::{Material, Plane, von_mises};

@@ -3,7 +3,7 @@
 use super::loads::SurfaceForce;
 use crate::{
     ROUNDING,
-    contact::{NodalConstraint, RigidMotions},
+    contact::{NodalConstraint, RigidMotions, RowLaw},
     fem::{Body, Elasticity, normal_error},
     mesh::{BoundaryFace, Lines, extent, joined_faces},
     scene::{Condition, Expression, Gap, Scene},
@@ -70,7 +70,7 @@ impl BoundaryConditions {
                 let largest = &mut conditions.normal_errors[node];
                 *largest = largest.max(normal_error);
                 let prescribed =
-                    |direction| NodalConstraint { node, direction, tributary_length: None };
+                    |direction| NodalConstraint { node, direction, law: RowLaw::Prescribed };
                 for condition in &boundary.conditions {
                     match condition {
                         Condition::Displacement([x, y]) => {
@@ -103,7 +103,8 @@ impl BoundaryConditions {
         }
         for (node, faces) in joined_faces(gaps) {
             for (BoundaryFace { normal: direction, length, .. }, distances) in faces {
-                let row = NodalConstraint { node, direction, tributary_length: Some(length) };
+                let law = RowLaw::Rigid { tributary_length: length };
+                let row = NodalConstraint { node, direction, law };
                 conditions.add(row, points[node], distances);
             }
         }

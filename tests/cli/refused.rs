@@ -74,6 +74,10 @@ fn arguments() {
             &["--solver", "simplex"][..],
             &["contact.solver is unknown", "`simplex`", "active-set", "tao"][..],
         ),
+        (
+            &["--solver", "tao:gpcg"],
+            &["contact.solver is unknown", "tao:tron, tao:bnls, tao:bntr, tao:bntl)"],
+        ),
         (&["--set", "time.stp=1"], &["--set time.stp=1: unknown key time.stp", "`step`"]),
         (&["--mesh", "none.msh"], &["none.msh: No such file"]),
         (&["--mesh", "scene.toml"], &["scene.toml: a mesh is a .msh, a geometry for gmsh"]),
@@ -84,7 +88,7 @@ fn arguments() {
         ),
         (
             &["--", "-tao_type", "none"],
-            &["-tao_type: `none` is none of TAO's types", "tron", "bqpip"],
+            &["-tao_type: `none` is none of TAO's types", "tron, bnls, bntr, bntl"],
         ),
         (&["--", "-elastic_pc_type", "cholesy"], &["-elastic_", "requested PC type cholesy"]),
         (&["--accuracy", "1e-9"], &["accuracy must be between 1e-5 and 0.5, but is 1e-9"]),

@@ -4,7 +4,7 @@
 use crate::support::{close, close_relative, difference, problem, run, square, try_run};
 use nalgebra::Matrix2;
 use signorini::{
-    contact::{Answer, Certificate, ContactPoint, Kkt, NodalConstraint, SOLVERS, Scales},
+    contact::{Answer, Certificate, ContactPoint, Kkt, NodalConstraint, RowLaw, SOLVERS, Scales},
     evolution::DiscreteProblem,
     petsc::Communicator,
 };
@@ -12,7 +12,7 @@ use signorini::{
 const SCALES: Scales = Scales { force: 10.0, displacement: 2.0 };
 
 fn gap(node: usize, direction: [f64; 2]) -> NodalConstraint {
-    NodalConstraint { node, direction, tributary_length: Some(1.0) }
+    NodalConstraint { node, direction, law: RowLaw::Rigid { tributary_length: 1.0 } }
 }
 
 /// Judges u and f − Ku at two nodes: u_x of node 0 is prescribed (2), node 0 presses with 6 at its
@@ -20,7 +20,7 @@ fn gap(node: usize, direction: [f64; 2]) -> NodalConstraint {
 fn judge(change: impl Fn(&mut [f64], &mut [f64])) -> (Kkt, Vec<ContactPoint>) {
     let (mut unbalanced, mut u) = (vec![0.0, 6.0, 0.0, 0.0], vec![2.0, 0.25, -1.0, 0.5]);
     change(&mut unbalanced, &mut u);
-    let fixed = NodalConstraint { node: 0, direction: [1.0, 0.0], tributary_length: None };
+    let fixed = NodalConstraint { node: 0, direction: [1.0, 0.0], law: RowLaw::Prescribed };
     let rows = [fixed, gap(0, [0.0, 1.0]), gap(1, [0.0, 1.0])];
     let values = &[2.0, 0.25, 1.0];
     let answer = Answer { rigid: &[], elastic: &u, unbalanced: &unbalanced, values };

@@ -2,7 +2,7 @@
 
 use crate::support::{problem, run, square};
 use signorini::{
-    contact::{Conflict, ConstraintError, Constraints, NodalConstraint, SOLVERS},
+    contact::{Conflict, ConstraintError, Constraints, NodalConstraint, RowLaw, SOLVERS},
     evolution::SetupError,
     mesh::{BoundaryFace, Mesh, joined_faces},
 };
@@ -128,11 +128,11 @@ fn contradictory_values_at_a_common_node_are_an_error() {
 
 /// Conditions at node 0.
 fn prescribed(direction: [f64; 2]) -> NodalConstraint {
-    NodalConstraint { node: 0, direction, tributary_length: None }
+    NodalConstraint { node: 0, direction, law: RowLaw::Prescribed }
 }
 
 fn gap(direction: [f64; 2]) -> NodalConstraint {
-    NodalConstraint { node: 0, direction, tributary_length: Some(1.0) }
+    NodalConstraint { node: 0, direction, law: RowLaw::Rigid { tributary_length: 1.0 } }
 }
 
 #[test]
@@ -204,8 +204,8 @@ fn gaps_of_one_smooth_boundary_become_one_bound_and_those_of_a_corner_two() {
         };
         let joined = joined_faces([face(-1.0, 0.1), face(1.0, 0.2)]).remove(&0).unwrap();
         let row = |(face, gaps): (BoundaryFace, Vec<f64>)| {
-            let tributary_length = Some(face.length);
-            (NodalConstraint { node: 0, direction: face.normal, tributary_length }, gaps)
+            let law = RowLaw::Rigid { tributary_length: face.length };
+            (NodalConstraint { node: 0, direction: face.normal, law }, gaps)
         };
         let (mut rows, gaps): (Vec<NodalConstraint>, Vec<Vec<f64>>) =
             joined.into_iter().map(row).unzip();

@@ -1,7 +1,7 @@
 //! The contact pressure as a field on Γ_C: uniform and linear pressures keep their values, the area under it is the
 //! force of each foundation.
 
-use crate::bore::disc;
+use crate::free_motions::disc;
 use crate::support::{
     close_relative, distorted, figures, moved, problem, run, shipped, square, turn, with_part,
 };

@@ -156,7 +156,8 @@ fn a_foreign_solver_that_claims_too_much_is_replaced_or_told() {
         let run = Simulation::new(&problem).solver(Box::new(Other(None))).run(&session);
         run.map(|outcome| (outcome.notes(&problem), outcome))
     };
-    let (notes, outcome) = run("").expect("the default solver gives the answer");
+    let (notes, outcome) =
+        run("contact.rescue = true").expect("the default solver gives the answer");
     assert_eq!(outcome.last.report.rescued_by, Some("active-set"));
     assert!(notes.iter().any(|note| note.contains("active-set gave the answer")), "{notes:?}");
     let message = run("contact.rescue = false").expect_err("it is told").to_string();
@@ -202,7 +203,7 @@ fn a_mesh_for_an_accuracy_and_its_bars_are_those_of_our_parts() {
         accuracy::adapted(&session, &scene, square(4), choices, 0.1, &mut |_| {}).unwrap()
     };
     let named = ChosenSolver::Named("penalty-duality".to_owned());
-    let (solver, _) = solvers(&named, true, &scene.contact).unwrap();
+    let solver = solvers(&named, true, &scene.contact).unwrap().remove(0);
     let solver = Box::new(Other(Some(solver)));
     let own = adapted(&Choices::of(&scene).solver(solver).law(Box::new(Source(paper))));
     let ours = adapted(&Choices::of(&scene));

@@ -8,13 +8,14 @@ use signorini::{
 
 /// A square without Γ_D over `gap`, pressed on top by 1 with the resultant at x = ½ + e.
 fn eccentric(gap: &str, e: f64) -> Result<DiscreteProblem, SetupError> {
-    let load = format!("-1 - 12*({e:e})*(x - 0.5)");
-    standing(gap, &load)
+    eccentric_with(gap, e, false)
 }
 
-fn standing(gap: &str, load: &str) -> Result<DiscreteProblem, SetupError> {
+fn eccentric_with(gap: &str, e: f64, rescue: bool) -> Result<DiscreteProblem, SetupError> {
+    let load = format!("-1 - 12*({e:e})*(x - 0.5)");
     let text = format!(
-        "material = {{ young = 1e4, poisson = 0.3, plane = 'stress' }}
+        "contact.rescue = {rescue}
+         material = {{ young = 1e4, poisson = 0.3, plane = 'stress' }}
          boundary = [{{ name = 'bottom', gap = '{gap}' }},
                      {{ name = 'top', traction = [0, '{load}'] }}]"
     );
@@ -71,10 +72,10 @@ fn all_solvers_agree_on_a_body_that_partly_lifts_off() {
 fn a_body_balanced_on_one_point_or_on_its_edge_is_noted() {
     for (gap, e, pivot) in [(CURVED, 0.0, "(0.5000,"), ("0", 0.5, "(1.0000,")] {
         for solver in SOLVERS {
-            let problem = eccentric(gap, e).unwrap();
+            // The fixed point of penalty-duality is slow where nothing stops the rotation: another solver may answer for it.
+            let problem = eccentric_with(gap, e, solver == "penalty-duality").unwrap();
             let outcome = run(&problem, solver);
             let mut notes = outcome.notes(&problem);
-            // The fixed point of penalty-duality is slow where nothing stops the rotation.
             notes.retain(|note| !note.contains("gave the answer"));
             assert_eq!(notes.len(), 1, "{solver}: {notes:?}");
             assert!(

@@ -69,7 +69,8 @@ impl Small {
             phases: &Phases::default(),
         };
         let options = ContactOptions::default();
-        let (solver, _) = solvers(&ChosenSolver::Named(name.to_owned()), true, &options).unwrap();
+        let chosen = ChosenSolver::Named(name.to_owned());
+        let solver = solvers(&chosen, true, &options).unwrap().remove(0);
         let mut elastic =
             LinearSolver::new(&session, "elastic_", size, Precision::Preconditioner).unwrap();
         elastic.factor().set_condensed(&matrix, 0..size).unwrap();

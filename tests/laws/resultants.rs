@@ -1,7 +1,7 @@
 //! Resultants of supports: what is zero, what the boundaries at a common node exert, and which loads balance.
 
 use crate::{
-    bore::disc,
+    free_motions::disc,
     support::{
         self, ORDERS, adapted, bent, close, distorted, history, moved, order, problem, run, scene,
         square, turn, unstructured,

@@ -36,7 +36,7 @@ fn quick_quadratic(name: &str) -> DiscreteProblem {
 }
 
 /// The steps and the outcome of each solver.
-type Answers = [(Vec<Step>, Outcome); 3];
+type Answers = [(Vec<Step>, Outcome); SOLVERS.len()];
 
 /// All solvers give the same answer of this scene, which is returned.
 fn agreed(name: &str, problem: &DiscreteProblem) -> Answers {

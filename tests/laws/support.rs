@@ -129,10 +129,14 @@ pub fn layered(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
+/// No solver answers for another one in a law, unless the law says so in its scene.
+const NO_RESCUE: &str = "contact.rescue=false";
+
 /// The scene `text` on a mesh that is given later.
 pub fn scene(text: &str) -> Scene {
+    let sets = Vec::from_iter((!text.contains("rescue")).then(|| NO_RESCUE.to_owned()));
     let text = format!("mesh.file = 'given.msh'\n{text}");
-    Scene::parse(&text, Path::new("law.toml"), &[]).unwrap_or_else(|error| panic!("{error}"))
+    Scene::parse(&text, Path::new("law.toml"), &sets).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The mesh of an accuracy, from a first one.
@@ -173,7 +177,7 @@ pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> Discret
             fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
         }
     }
-    let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
+    let sets: Vec<String> = sets.iter().chain(&[NO_RESCUE]).map(|s| (*s).to_owned()).collect();
     let scene = folder.path().join(name).with_extension("toml");
     let scene = Scene::read(&scene, &sets).unwrap_or_else(|e| panic!("{e}"));
     if !old.is_empty() {

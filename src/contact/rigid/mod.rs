@@ -21,8 +21,7 @@ pub struct RigidMotions {
     pub free: Vec<RigidMotion>,
     /// Per free motion: the largest |u·ν| at axes and gaps, which is the uncertainty of the motion.
     free_errors: Vec<f64>,
-    /// Resisted motions: contact resists them in one sense. They are the null space of K with pinned free
-    /// motions.
+    /// Resisted motions: contact resists them in one sense.
     pub resisted: Vec<RigidMotion>,
     /// u·ν of the resisted motions, one row per gap condition of the undivided body.
     normal: DMatrix<f64>,
@@ -88,6 +87,11 @@ impl RigidMotions {
         Self { free, free_errors, resisted, normal }
     }
 
+    /// The null space of the present K with pinned free motions: as no law of a gap has a stiffness, all resisted motions.
+    pub fn null_space(&self) -> &[RigidMotion] {
+        &self.resisted
+    }
+
     /// Are all rigid motions prevented? K is then positive definite.
     pub fn all_prevented(&self) -> bool {
         self.free.is_empty() && self.resisted.is_empty()
@@ -99,10 +103,10 @@ impl RigidMotions {
         RigidMotion::combination(body, amplitudes.iter().copied().zip(motions))
     }
 
-    /// u·ν at `bounds` (rows) of the motions that contact alone constrains (columns).
+    /// u·ν at `bounds` (rows) of the null space of K (columns).
     pub fn normal_at(&self, body: &Body, bounds: &[Bound]) -> DMatrix<f64> {
         let normals: Vec<_> = bounds.iter().map(|bound| (bound.node, bound.normal)).collect();
-        normal_displacements(&body.nodes.points, &self.resisted, &normals)
+        normal_displacements(&body.nodes.points, self.null_space(), &normals)
     }
 
     /// ∫u·m/|Ω| of each motion m that contact alone constrains. Collective.

@@ -6,11 +6,11 @@ use crate::{
     linear::{Factor, LinearSolver, Reduction},
     petsc::{BoundedQuadratic, Matrix, PetscError, ShellPreconditioner, TaoReport, Vector},
 };
-use std::{iter, rc::Rc};
+use std::rc::Rc;
 
 pub(super) const TAO: SolverEntry = SolverEntry {
     name: "tao",
-    summary: "PETSc's TAO, trust-region Newton method tron; tao:TYPE for its other types",
+    summary: "PETSc's TAO, trust-region Newton method tron; also tao:bnls, tao:bntr, tao:bntl",
     variants: &TAO_TYPES,
     rescuer: Some("active-set"),
     construct: |kind, _| {
@@ -18,12 +18,9 @@ pub(super) const TAO: SolverEntry = SolverEntry {
     },
 };
 
-/// TAO's types for bounded variables, reached as `tao:TYPE`. Some of them stall or err on contact problems; the
-/// KKT residuals then show it.
-pub const TAO_TYPES: [&str; 12] = [
-    "tron", "bnls", "bntr", "bntl", "gpcg", "blmvm", "bqnls", "bqnktr", "bqnktl", "bqnkls", "bncg",
-    "bqpip",
-];
+/// TAO's types for bounded variables that solve contact problems, reached as `tao:TYPE`: Newton's methods. The others stall on
+/// slender bodies or on bodies that contact alone supports (STABILITY.md).
+pub const TAO_TYPES: [&str; 4] = ["tron", "bnls", "bntr", "bntl"];
 
 /// One of TAO's types on a kept Cholesky factor (`-tao_type` chooses another).
 ///
@@ -46,9 +43,6 @@ const STALLED: usize = 7;
 const ITERATIONS: usize = 200;
 /// ρ if contact alone constrains a rigid motion.
 const PROXIMAL: f64 = 1e-9;
-/// The interior-point method needs finite bounds. This one, in units of U, replaces infinity. An answer at this
-/// bound is not stationary, so the residuals reject it.
-const BOX: f64 = 1e2;
 /// PETSC_INFINITY.
 const INFINITE: f64 = f64::MAX / 4.0;
 
@@ -75,16 +69,15 @@ impl Tao {
         let (start, force) = (c.read(<[f64]>::to_vec)?, problem.stiffness_scale * unit);
         let load = |(f, c): (&f64, &f64)| f / force + proximal * c / unit;
         let load = problem.load.read(|f| vector(f.iter().zip(&start).map(load).collect()))??;
-        let infinite = if self.kind == "bqpip" { BOX } else { INFINITE };
         let limits = |unbounded: f64, side: fn(&Bound) -> f64| {
             let mut limits = vec![unbounded; start.len()];
             for bound in problem.bounds {
-                limits[bound.dof] = (side(bound) / unit).clamp(-infinite, infinite);
+                limits[bound.dof] = (side(bound) / unit).clamp(-INFINITE, INFINITE);
             }
             vector(limits)
         };
-        let lower = limits(-infinite, |bound| bound.lower)?;
-        let upper = limits(infinite, |bound| bound.upper)?;
+        let lower = limits(-INFINITE, |bound| bound.lower)?;
+        let upper = limits(INFINITE, |bound| bound.upper)?;
         let mut x = vector(start.iter().map(|c| c / unit).collect())?;
         let goal = (problem.linear_residual() / force, ITERATIONS);
         let bounds = [&lower, &upper];
@@ -115,10 +108,6 @@ impl ContactSolver for Tao {
             None => first_unit(problem)?,
         };
         let factor = elastic.factor();
-        if self.kind == "bqpip" {
-            // Only the operator has the terms that the interior point method adds to the diagonal.
-            factor.set_condensed(&stiffness, iter::empty())?;
-        }
         let mut tao = BoundedQuadratic::new(problem.session, &self.kind)?;
         let mut preconditioner = TaoPreconditioner { k: &stiffness, factor };
         let mut report = ContactReport::default();

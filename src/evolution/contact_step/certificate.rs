@@ -1,16 +1,14 @@
 //! Certifies an answer from its displacements alone: KKT residuals and contact forces.
 
-use super::{Accuracy, ContactStep, accuracy::MAX_ROUNDING};
+use super::{ContactStep, Reference};
 use crate::{
     ROUNDING,
-    contact::{Answer, Constraints, ContactError, ContactOptions, ContactPoint, Kkt, Scales},
+    contact::{Answer, Constraints, ContactPoint, Kkt, Scales},
     fem::RigidMotion,
     maximum,
     problem::LoadCase,
 };
 
-/// Residuals are the effect of rounding if they are at most this many times its estimate.
-const ROUNDED: f64 = 10.0;
 /// The cosine between u and its elastic forces is below this only if K is indefinite.
 const NEGATIVE_ENERGY: f64 = -1e-10;
 
@@ -49,9 +47,9 @@ impl Candidate {
 }
 
 impl ContactStep<'_> {
-    /// The KKT residuals of u, measured from the reference. Forces are summed by the code of
+    /// The KKT residuals of u, measured from a reference. Forces are summed by the code of
     /// [`Elasticity`](crate::fem::Elasticity), not by the operator of the solvers.
-    pub(super) fn certify(&self, u: Vec<f64>, case: &LoadCase) -> Candidate {
+    pub(super) fn certify(&self, reference: &Reference, u: Vec<f64>, case: &LoadCase) -> Candidate {
         let problem = self.problem;
         let (body, partition) = (&problem.body, &problem.body.nodes.partition);
         let rigid = RigidMotion::nearest(body, &u);
@@ -68,15 +66,15 @@ impl ContactStep<'_> {
         partition.comm().sum(&mut sums);
         let force = maximum(sums[0], sums[1]).sqrt();
         let [.., load, internal] = sums;
-        let is_rigid = elastic_max <= self.reference_rounding().max(ROUNDING * rigid_max);
+        let is_rigid = elastic_max <= self.rounding_of(reference, case).max(ROUNDING * rigid_max);
         let [forces, rounding] = match is_rigid && load == 0.0 {
             true => [0.0, f64::INFINITY],
             false => [load.max(internal), 0.0],
         };
-        let scales = self.run_scales(Scales { force, displacement: elastic_max });
+        let scales = self.run_scales(Scales { force, displacement: elastic_max }, reference, case);
         let energy = sums[2] / (scales.force * sums[3].sqrt()).max(f64::MIN_POSITIVE);
         let answer = Answer {
-            rigid: &self.next.reference.field,
+            rigid: &reference.field,
             elastic: &u,
             unbalanced: &unbalanced,
             values: &case.values,
@@ -106,59 +104,28 @@ impl ContactStep<'_> {
 
     /// The scales of an answer, at least the scales of the run so far. They include the rounding of the reference
     /// motion, the only scale of a rigid body. The displacement scale is at least force scale / stiffness.
-    pub(super) fn run_scales(&self, answer: Scales) -> Scales {
-        let (run, rounding) = (self.accepted.scales, self.reference_rounding());
+    pub(super) fn run_scales(
+        &self,
+        answer: Scales,
+        reference: &Reference,
+        case: &LoadCase,
+    ) -> Scales {
+        let (run, rounding) = (self.accepted.scales, self.rounding_of(reference, case));
         let force = answer.force.max(run.force).max(self.stiffness.scale * rounding);
         let min = rounding.max(force / self.stiffness.scale);
         Scales { force, displacement: answer.displacement.max(run.displacement).max(min) }
     }
 
-    /// The rounding of the reference motion, m. Collective.
-    fn reference_rounding(&self) -> f64 {
-        let reference = &self.next.reference;
+    /// The rounding of the differences between the values of the rows and the reference motion, m. Where a row is in
+    /// effect, both are equal but for the deformation. So the rounding is at most that of the values: a body without
+    /// support may move further, which is no reason for larger scales. Collective.
+    fn rounding_of(&self, reference: &Reference, case: &LoadCase) -> f64 {
+        let partition = &self.problem.body.nodes.partition;
+        let value = case.values.iter().fold(0.0_f64, |max, value| max.max(value.abs()));
         match reference.is_zero() {
             true => 0.0,
-            false => ROUNDING * self.problem.body.nodes.partition.max_norm(&reference.field),
+            false => ROUNDING * partition.max_norm(&reference.field).min(value),
         }
-    }
-
-    /// Adds to an error the tolerance that double precision can reach, if this explains the error.
-    pub(super) fn limited(&self, error: ContactError, candidate: &Candidate) -> ContactError {
-        let attainable = ROUNDED * self.rounding(candidate);
-        match attainable > self.problem.tolerance
-            && candidate.kkt.within(attainable)
-            && attainable < 1.0
-        {
-            true => ContactError::Limited {
-                source: Box::new(error),
-                attainable,
-                contrast: self.problem.contrast(),
-            },
-            false => error,
-        }
-    }
-
-    /// Is u exact for a stiffness whose entries are off by ε_machine? In addition, its residuals must be at most
-    /// `MAX_ROUNDING`, or its relative `error` at most the promised one. A tolerance below the default must be met.
-    pub(super) fn is_exact_to_rounding(&self, candidate: &Candidate, error: Option<f64>) -> bool {
-        let tolerance = self.problem.tolerance;
-        let is_small = |error| error <= Accuracy::promised(tolerance);
-        tolerance >= ContactOptions::default().tolerance
-            && self.is_rounding(candidate)
-            && (candidate.kkt.within(MAX_ROUNDING) || error.is_some_and(is_small))
-    }
-
-    /// Are the residuals of u at most the rounding of its internal forces?
-    pub(super) fn is_rounding(&self, candidate: &Candidate) -> bool {
-        candidate.kkt.within(self.rounding(candidate))
-    }
-
-    /// The rounding of the internal forces of u, ε_machine ‖|K||u|‖₂ / F.
-    fn rounding(&self, candidate: &Candidate) -> f64 {
-        let body = &self.problem.body;
-        let elasticity = &self.problem.elasticity;
-        let rounding = elasticity.force_rounding(body, &self.zeta_at_points, &candidate.u);
-        body.nodes.partition.norm(&rounding, 2) / candidate.scales.force
     }
 }
 

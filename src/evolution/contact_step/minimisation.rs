@@ -1,6 +1,6 @@
 //! (26) in the form for its solver: in the unknowns c, with all loads on the free unknowns.
 
-use super::ContactStep;
+use super::{Attempt, ContactStep};
 use crate::{
     contact::{Bound, ContactError, ContactProblem, ContactReport, Scales},
     evolution::{DiscreteProblem, LoadCase},
@@ -12,24 +12,43 @@ use crate::{
 const MOVED_ALONE: f64 = 1e-2;
 
 impl ContactStep<'_> {
-    /// Replaces c by the solution of (26) for the load f − K u_D, with u_D = `c_prescribed` the prescribed unknowns.
+    /// Replaces c by the solution of (26) for the load f − K u_D, with u_D the prescribed unknowns, and returns u. It also
+    /// returns the error of a solver that stopped short of its tolerance: all ranks know this error. Any other error may
+    /// concern one rank only.
     ///
-    /// The certificate of the previous answer c may give the force scale F, `known_scale`, and the residual forces
-    /// `unbalanced` = f − Ku. The load is then K c + `unbalanced`, so that rounding of the assembled K cancels.
-    pub(super) fn solve_contact(
+    /// The certificate of the answer before may give the force scale F and the residual forces f − Ku. The load is then
+    /// K c + (f − Ku), so that rounding of the assembled K cancels.
+    pub(super) fn minimise(
         &mut self,
+        attempt: &mut Attempt,
+        case: &LoadCase,
+    ) -> Result<(Vec<f64>, Option<ContactError>), ContactError> {
+        let (c_prescribed, bounds) =
+            attempt.next.reference.prescribed_and_bounds(&self.problem.constraints, case);
+        let (spent, stopped) = match self.solve_contact(attempt, case, &c_prescribed, &bounds) {
+            Ok(spent) => (spent, None),
+            Err(error) => match error {
+                ContactError::NotConverged { ref report, .. } => (**report, Some(error)),
+                other => return Err(other),
+            },
+        };
+        attempt.spent = spent;
+        Ok((displacement(self.problem, c_prescribed, &self.c)?, stopped))
+    }
+
+    fn solve_contact(
+        &mut self,
+        attempt: &mut Attempt,
         case: &LoadCase,
         c_prescribed: &[f64],
         bounds: &[Bound],
-        tolerance: f64,
-        (known_scale, unbalanced): (Option<f64>, Option<Vec<f64>>),
     ) -> Result<ContactReport, ContactError> {
         let comm = self.problem.body.nodes.partition.comm();
         let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
         let overlaps = comm.any(!bounds.iter().all(admits_zero));
         let (load, force) =
             self.load_and_scale(&case.load, c_prescribed, overlaps.then_some(bounds));
-        let force = known_scale.map_or(force, |known| force.min(known));
+        let force = attempt.force_scale.map_or(force, |known| force.min(known));
         let bases = &self.problem.constraints.bases;
         let in_unknowns = |mut force: Vec<f64>| {
             bases.force_to_local(&mut force);
@@ -43,7 +62,8 @@ impl ContactStep<'_> {
             self.c.write(|c| c.fill(0.0))?;
             return Ok(ContactReport::default());
         }
-        if let Some(unbalanced) = unbalanced.map(in_unknowns) {
+        if let Some([_, unbalanced]) = &attempt.refined {
+            let unbalanced = in_unknowns(unbalanced.clone());
             self.stiffness.matrix.multiply(&self.c, &mut self.load)?;
             self.load.write(|load| load.iter_mut().zip(&unbalanced).for_each(|(f, r)| *f += r))?;
         }
@@ -55,15 +75,20 @@ impl ContactStep<'_> {
             bounds,
             rigid: &self.rigid,
             work: &case.work,
-            scales: self.run_scales(Scales { force, displacement: 0.0 }),
-            tolerance,
+            scales: self.run_scales(
+                Scales { force, displacement: 0.0 },
+                &attempt.next.reference,
+                case,
+            ),
+            tolerance: attempt.tolerance,
             comm,
             phases: self.phases,
         };
         let bounded = bounds.iter().map(|bound| bound.dof);
         self.elastic.factor().set_condensed(contact.stiffness, bounded)?;
-        let Self { solver, elastic, next, c, .. } = self;
-        self.phases.time("contact", || solver.solve(&contact, elastic, &mut next.warm_start, c))
+        let Self { solvers, elastic, c, .. } = self;
+        let (solver, warm_start) = (&solvers[attempt.solver], &mut attempt.next.warm_start);
+        self.phases.time("contact", || solver.solve(&contact, elastic, warm_start, c))
     }
 
     /// The load f − K u_D, and its scale F: ‖f‖₂ or, if larger, a fraction of ‖f − K u_D‖₂ or of ‖K v‖₂. u_D is

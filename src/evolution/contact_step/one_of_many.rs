@@ -1,6 +1,6 @@
 //! Rigid motions that no contact force resists. (26) then has many answers with the same forces.
 
-use super::{ContactStep, active_bounds, certificate::Candidate};
+use super::{AcceptedState, ContactStep, active_bounds, certificate::Candidate};
 use crate::{
     contact::{self, ContactPoint, least_motion},
     fem::RigidMotion,
@@ -39,7 +39,8 @@ impl ContactStep<'_> {
     /// does not depend on the solver. Its certificate fails if a neglected contact force counts or acts across an
     /// opening gap. Then fewer forces are neglected, or `candidate` is returned. Collective.
     pub(super) fn of_minimum_displacement(
-        &mut self,
+        &self,
+        next: &mut AcceptedState,
         candidate: Candidate,
         case: &LoadCase,
     ) -> Result<Candidate, PetscError> {
@@ -50,20 +51,20 @@ impl ContactStep<'_> {
             if left.is_empty() || candidate.force == 0.0 {
                 break;
             }
-            let before = self.next.reference.clone();
-            let total = before.total(candidate.u.clone());
+            let total = next.reference.total(candidate.u.clone());
             let amplitudes = problem.motions.amplitudes(&problem.body, &total);
-            let (bounds, c) = self.at_bounds(case)?;
+            let (bounds, c) = self.at_bounds(&next.reference, case)?;
             let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
             let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
                 break;
             };
-            self.move_rigidly(&further);
-            let moved = self.certify(candidate.u.clone(), case);
+            let mut reference = next.reference.clone();
+            self.move_rigidly(&mut reference, &further);
+            let moved = self.certify(&reference, candidate.u.clone(), case);
             if moved.kkt.within(tolerance) {
+                next.reference = reference;
                 return Ok(moved);
             }
-            self.next.reference = before;
         }
         Ok(candidate)
     }

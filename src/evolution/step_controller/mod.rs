@@ -40,7 +40,7 @@ pub(super) enum Decision {
 }
 
 /// Plans the steps of a run, and accepts or rejects them. A rejected step changes the length of the next one and nothing else.
-/// The damage system may keep its factor, see `ContactStep::solve_by_one`.
+/// The damage system may keep its factor, see `ContactStep::solve`.
 pub(crate) struct StepController<'a> {
     problem: &'a DiscreteProblem,
     law: &'a dyn DamageSource,

@@ -1,4 +1,4 @@
-//! A step that fails has not happened: what follows it is what would have followed without it.
+//! A rejected step leaves no trace: the steps after it are those that would have followed without it.
 
 use crate::support::{Random, close, difference, distorted, history, problem, same_iterations};
 use signorini::{
@@ -89,7 +89,7 @@ fn a_rescued_step_that_is_rejected_leaves_no_trace() {
     let torn = |problem: &DiscreteProblem, succeeds| vec![(1.8, zeta(problem, 0.4), succeeds)];
     let alone = scene(left, "60\n contact.rescue = false");
     second_step(&alone, solver, &torn(&alone, false));
-    let problem = scene(left, "60");
+    let problem = scene(left, "60\n contact.rescue = true");
     let plain = second_step(&problem, solver, &[]);
     let step = second_step(&problem, solver, &torn(&problem, true));
     assert!(plain.report.omega.is_some() && plain.report.rescued_by.is_none());

@@ -1,5 +1,5 @@
-//! What a scene may pose beside constant gaps and tractions by formulas: plates that move, bodies that
-//! are pressed in, pressures, loads that jump.
+//! Obstacles and loads beside constant gaps and tractions: plates that move, bodies that are pressed into a gap, pressures,
+//! loads that jump.
 
 use crate::support::{
     close_relative, difference, distorted, history, largest, layered, moved, problem, run, square,

@@ -1,4 +1,4 @@
-//! Discs in bores, which turn freely, and gaps that are rounding.
+//! Rigid motions that neither supports nor contact prevent: in all units, for discs in bores, and with gaps of rounding.
 
 use crate::support::{difference, moved, problem, run, square, turn};
 use signorini::{
