@@ -1,4 +1,4 @@
-//! `signorini figures`, `report`, `info` and `compare`: Python scripts embedded in the program.
+//! `signorini plot`, `report`, `info` and `compare`: Python scripts embedded in the program.
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;
@@ -17,8 +17,8 @@ macro_rules! scripts {
 
 /// The scripts and the modules that they import from each other.
 const SCRIPTS: [(&str, &str); 25] = scripts! {
-    "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions" "figures"
-    "histories" "info" "limits" "lines" "maps" "paraview_script" "paraview_view" "principal" "reading" "report"
+    "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions"
+    "histories" "info" "limits" "lines" "maps" "paraview_script" "paraview_view" "plot" "principal" "reading" "report"
     "report_pdf" "results" "setting" "signorini_results" "signorini_summaries" "study" "table"
 };
 /// The template of the report, for `report`.
