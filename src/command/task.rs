@@ -2,7 +2,6 @@
 
 use signorini::{
     estimate::{Adapted, Measured},
-    evolution::Phases,
     interrupt::Interrupts,
     problem::DiscreteProblem,
     scene::AsRun,
@@ -24,6 +23,8 @@ pub struct Task<'a> {
     pub adapted: Option<Adapted>,
     /// The measured errors of the mesh; empty if they were not measured.
     pub measured: Measured,
+    /// Is a proved bound on the error of u asked for?
+    pub bound: bool,
     /// Is this a repetition with shorter steps?
     pub repeats: bool,
     /// Notes on the arguments and on the error bars.
@@ -33,8 +34,5 @@ pub struct Task<'a> {
     /// Signals are deferred from the first run on, whichever follows.
     pub _interrupts: Interrupts,
     pub petsc: &'a [String],
-    /// Whether to print the table of phases.
-    pub profile: bool,
-    pub phases: &'a Phases,
     pub started: Instant,
 }

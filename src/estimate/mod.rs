@@ -8,7 +8,8 @@
 //! - [`Measured`]: the error bar of each printed figure, measured by the same run on three meshes;
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
-//! For the error of u from the mesh there is also a proved bound, from an [`EquilibratedStress`].
+//! For the error of u from the mesh a run also proves a bound if it is asked for
+//! ([`Simulation::bound`]), from an [`EquilibratedStress`].
 //!
 //! [`adapted`] makes a mesh for an accuracy ([`Adapted`]). Each round has a run with few steps, estimates and
 //! bisection. A measurement ends the rounds.
@@ -35,7 +36,7 @@ pub use simulation::Simulation;
 
 use crate::{
     evolution::{AIM, ErrorBudget, Outcome, Run, RunError},
-    petsc::PetscError,
+    petsc::{PetscError, stage},
     problem::{Bar, DiscreteProblem, State},
 };
 use nalgebra::DVector;
@@ -43,30 +44,29 @@ use nalgebra::DVector;
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 const UNLOADED: f64 = 0.01;
 
-/// Estimates the errors of a finished run and enters them in its outcome. Collective.
-fn estimated(run: Run) -> Result<Outcome, RunError> {
+/// Estimates the errors of a finished run, with a proved bound on that of u if it is `asked`, and enters them in its outcome.
+/// Collective.
+fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
     let Run { mut damage_step, mut contact_step, mut controller, mut outcome } = run;
-    let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
-    outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
+    let problem = damage_step.problem;
+    outcome.accuracy = stage("accuracy", || contact_step.accuracy(&outcome))?;
+    outcome.accuracy.energy = stage("accuracy", || energy_error(problem, &outcome))?;
     let state = representative(&outcome).clone();
-    let proof = phases.time("proof", || {
-        equilibrated::proved_error(&mut contact_step, &state, outcome.accuracy.energy)
-    })?;
-    if let Ok(proof) = &proof
+    let prove = || equilibrated::proved_error(&mut contact_step, &state, outcome.accuracy.energy);
+    let proof = asked.then(|| stage("proof", prove)).transpose()?;
+    if let Some(Ok(proof)) = &proof
         && proof.left_out.is_empty()
     {
         outcome.accuracy.energy = outcome.accuracy.energy.min(proof.relative);
     }
-    outcome.penetration = phases.time("accuracy", || {
+    outcome.penetration = stage("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
     let is_known = problem.damage().is_some()
         && outcome.stopped.is_none()
         && controller.add_last_error(&mut damage_step).is_ok();
     let steps = is_known.then(|| [controller.step_error(), controller.step_bar()]);
-    outcome.errors =
-        ErrorBudget::new(problem, &outcome, steps, proof.map(|of| (of.relative, of.left_out)));
+    outcome.errors = ErrorBudget::new(problem, &outcome, steps, proof);
     Ok(outcome)
 }
 

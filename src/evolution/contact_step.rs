@@ -27,14 +27,14 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, Phases, RunError, State, Step, StepFailure, StepRecord,
-    agreed, extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, RunError, State, Step, StepFailure, StepRecord, agreed,
+    extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
-    petsc::{PetscError, Session, Vector},
+    petsc::{PetscError, Session, Vector, stage},
     problem::SHOWN_AS_ZERO,
 };
 use certificate::Candidate;
@@ -48,7 +48,6 @@ use std::time::Instant;
 pub struct ContactStep<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
-    phases: &'a Phases,
     solver: SharedSolver,
     /// The solver for steps in which `solver` stops short of the tolerance.
     rescuer: Option<SharedSolver>,
@@ -109,11 +108,10 @@ impl<'a> ContactStep<'a> {
         session: &'a Session,
         problem: &'a DiscreteProblem,
         choices: &Choices,
-        phases: &'a Phases,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
         let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
-        let stiffness = phases.time("stiffness pattern", || {
+        let stiffness = stage("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
         let options = &problem.scene().contact;
@@ -131,7 +129,6 @@ impl<'a> ContactStep<'a> {
         Ok(Self {
             session,
             problem,
-            phases,
             solver,
             rescuer,
             elastic: LinearSolver::new(session, contact::ELASTIC, unknowns, precision)?,
@@ -163,16 +160,16 @@ impl<'a> ContactStep<'a> {
         is_warm: bool,
     ) -> Result<Step, RunError> {
         let started = Instant::now();
-        let (problem, phases) = (self.problem, self.phases);
+        let problem = self.problem;
         let (comm, zeta_at_points) =
             (problem.body.nodes.partition.comm(), problem.zeta_at_points(zeta));
         if comm.any(zeta_at_points != self.zeta_at_points) {
-            phases.time("stiffness", || {
+            stage("stiffness", || {
                 self.stiffness.set_damage(&problem.body, &zeta_at_points);
             });
             self.zeta_at_points = zeta_at_points;
         }
-        let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
+        let case = agreed(comm, stage("loads", || problem.load_case(time)))?;
         self.start(&case)?;
         if !is_warm {
             self.next.warm_start.clear();
@@ -192,8 +189,8 @@ impl<'a> ContactStep<'a> {
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = self.next.reference.total(u);
         let state = State { time, u, zeta: zeta.to_vec(), contact };
-        let (observation, figures) = phases
-            .time("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
+        let (observation, figures) =
+            stage("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
         let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);
         record.seconds = started.elapsed().as_secs_f64();
         if !(0.0..=MAX_DISPLACEMENT).contains(&record.displacement_max) {
@@ -221,7 +218,7 @@ impl<'a> ContactStep<'a> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let mut c = self.c.read(<[f64]>::to_vec)?;
         self.next.reference.translate(&problem.constraints, &mut c, 1.0);
-        self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
+        stage("extrapolation", || self.extrapolation.accept(comm, time, c));
         self.accepted = self.next.clone();
         Ok(())
     }
@@ -251,7 +248,7 @@ impl<'a> ContactStep<'a> {
         if unloaded {
             *reference = Reference::default();
         }
-        self.phases.time("extrapolation", || {
+        stage("extrapolation", || {
             let predicted = self.extrapolation.at(case.time);
             let mut c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
             reference.translate(constraints, &mut c, -1.0);

@@ -45,7 +45,7 @@ pub(super) const BYTES_PER_OPERATION: f64 = 0.8;
 const BYTES_PER_ENTRY: f64 = 200.0;
 
 impl Cholesky {
-    /// Orders and analyses `a`. The last `interface` rows are the last in the order too; [`Self::solve`] leaves them out.
+    /// Orders and analyses `a`. The last `interface` rows stay the last ones; [`Self::solve`] leaves them out.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -108,7 +108,7 @@ impl Cholesky {
     /// L₂₂ of a factor that has values.
     fn interface_block(&self) -> DMatrix<f64> {
         let (values, first) = (self.factor.values(), self.interior);
-        let size = self.order().len() - first;
+        let size = self.permutation().len() - first;
         let mut block = DMatrix::zeros(size, size);
         for (columns, rows, start) in self.factor.supernodes() {
             for column in columns.start.max(first)..columns.end {
@@ -128,8 +128,8 @@ impl Cholesky {
     }
 
     /// P: the row of A of each row of L.
-    pub fn order(&self) -> &[i64] {
-        self.factor.order()
+    pub fn permutation(&self) -> &[i64] {
+        self.factor.permutation()
     }
 
     /// The forward solve with L₁₁ and L₂₁, which returns y₂:
@@ -149,7 +149,7 @@ impl Cholesky {
 
     /// `x` ← A₁₁⁻¹ b₁, and 0 in the rows of the interface.
     pub fn solve(&mut self, b: &[f64], x: &mut [f64]) {
-        let interface = vec![0.0; self.order().len() - self.interior];
+        let interface = vec![0.0; self.permutation().len() - self.interior];
         self.forward(b);
         self.backward(&interface, x);
     }

@@ -2,7 +2,7 @@
 
 use super::{
     Communicator, PetscError, check, error::keep_message, handle::OPEN_HANDLES, options,
-    options::c_string, raw, shell_preconditioner,
+    options::c_string, raw, shell_preconditioner, stage::HAS_SESSION,
 };
 use crate::memory::address_space;
 use std::{
@@ -64,6 +64,7 @@ impl Session {
         } else if !options.is_empty() {
             options::insert(options)?;
         }
+        HAS_SESSION.set(true);
         Ok(Self { _turn: turn })
     }
 
@@ -86,6 +87,12 @@ impl Session {
             }
             n => Err(PetscError::ours(format!("{n} PETSc objects outlive their session"))),
         }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        HAS_SESSION.set(false);
     }
 }
 

@@ -6,7 +6,7 @@ use super::{
 use crate::{
     contact::{ContactError, ContactReport},
     evolution::{LoadCase, RunError},
-    petsc::PetscError,
+    petsc::{PetscError, stage},
 };
 
 /// Maximum number of solves for one answer, each to a smaller tolerance or from another reference.
@@ -115,7 +115,7 @@ impl ContactStep<'_> {
                 solved => solved,
             };
         let u = displacement(self.problem, c_prescribed, &self.c)?;
-        Ok((solved, self.phases.time("certificate", || self.certify(u, case))))
+        Ok((solved, stage("certificate", || self.certify(u, case))))
     }
 
     /// Moves the reference by the rigid part of an answer; returns false if the answer is not mostly rigid.

@@ -133,7 +133,7 @@ fn wait(
     let (started, _interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
-    let mut told = false;
+    let mut is_noted = false;
     loop {
         if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
             return Ok(status);
@@ -142,7 +142,7 @@ fn wait(
             let squares: f64 = fs::read_to_string(squares).ok()?.trim().parse().ok()?;
             Some(TRIANGLES_PER_SQUARE * squares).filter(|triangles| *triangles >= 1.0)
         };
-        if !told
+        if !is_noted
             && (started.elapsed() > NOTE_AFTER || triangles().is_some_and(|all| all > ANNOUNCED))
         {
             let of =
@@ -154,7 +154,7 @@ fn wait(
                      .step in mm)"
                 ),
             );
-            told = true;
+            is_noted = true;
         }
         let late = started.elapsed().as_secs_f64() > limit;
         let signal = received();
