@@ -98,7 +98,8 @@ impl Cholesky {
         residual <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
     }
 
-    /// Checks that there is memory for L, 32 MB of it perhaps in malloc's pool: Linux may kill for more. Collective.
+    /// Checks that there is memory for L, because Linux may kill a process that takes more. malloc's pool may hold 32 MB.
+    /// Collective.
     pub(super) fn check_memory(&self, comm: Communicator) -> Result<(), PetscError> {
         let [_, entries] = self.factor.operations_and_entries();
         let needed = 8.0 * comm.total(entries) / comm.size() as f64 - 33.6e6;

@@ -26,9 +26,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 pub struct Singular {
     /// The point, m.
     pub at: [f64; 2],
-    /// Stresses nearer than this are large because of it: the length of the longest edge there, m.
+    /// The distance within which the point makes stresses large, m: the length of the longest edge at the point.
     pub radius: f64,
-    /// What it is, as in "the end of `clamp`".
+    /// The kind of the point, as in "the end of `clamp`".
     pub name: String,
     /// Is it singular only while contact is open there?
     pub is_open: bool,

@@ -259,8 +259,8 @@ impl<'a> StepController<'a> {
         };
         self.history.violation.observe(planned, damage.min_max, time);
         let [error, rate, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
-        // An error δζ delays the stop by δζ/ζ′. The rate at the beginning of the step is about the mean of the rates of both
-        // steps, and the smaller one of it and of the last rate counts: ζ may fall faster and faster, or the load may pass.
+        // An error δζ delays the stop by δζ/ζ′. ζ may fall faster and faster, or the load may pass: so ζ′ is the smaller one of
+        // the last rate and of the rate at the beginning of the step, about the mean of the rates of both steps.
         let slower = rate.abs().min(0.5 * (rate + rate_before).abs());
         let delay = (error / slower).abs();
         // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
