@@ -36,19 +36,19 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run figures keys test validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run plot keys test validate random compare \
     bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
 help:
-	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw their figures into out/'
+	@echo 'make mesh && make run   mesh and solve the scenes of geo/, draw pictures into out/'
 	@echo
 	@echo 'make deps       install the Debian packages that are missing'
 	@echo 'make build      $(BINARY) and $(notdir $(STUDIES))'
 	@echo 'make deb        a Debian package for this release of Debian, in target/debian'
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
-	@echo 'make figures    the figures of every run in out/, again; or ARGS="--animate --format svg"'
+	@echo 'make plot       the pictures of every run in out/, again; or ARGS="--animate --format svg"'
 	@echo 'make keys       geo/KEYS.md from the schema of scenes and the figures of the program'
 	@echo 'make test       format, lints, documentation, tests (4 minutes)'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
@@ -107,13 +107,13 @@ mesh: build
 run: build
 	@set -e; for scene in $(SCENE); do \
 	    $(BINARY) run $$scene $(if $(SOLVER),--solver $(SOLVER)) $(ARGS); \
-	    $(BINARY) figures out/$$(basename $$scene .toml); \
+	    $(BINARY) plot out/$$(basename $$scene .toml); \
 	    echo; \
 	done
 
-figures: build
+plot: build
 	@set -e; for run in $(patsubst %/summary.json,%,$(wildcard out/*/summary.json)); do \
-	    $(BINARY) figures $$run $(ARGS); \
+	    $(BINARY) plot $$run $(ARGS); \
 	done
 
 # The build reads the old page, so the new one is written beside it. Its mode stays.

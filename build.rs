@@ -10,6 +10,7 @@ const PETSC: &str = "\
     PetscInitialize|PetscInitialized|PetscGetVersionNumber|PetscFinalize|PetscPushErrorHandler|\
     PetscOptionsInsertString|PetscOptionsSetValue|PetscOptionsHasName|\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
+    PetscLogStageGetId|PetscLogStageRegister|PetscLogStagePush|PetscLogStagePop|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Bcast|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
     MPI_Ibarrier|MPI_Test|MPI_Abort|omp_set_max_active_levels|mallopt|dtrsm_|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\

@@ -4,7 +4,7 @@
     scripts/architecture.py geo/rooms.svg
 
 Rooms stand in the order of lib.rs. A room may use only those before it: otherwise the exit code is 1. An arrow is left out if
-a way by other rooms leads there.
+a way by other rooms leads there. The exit code is also 1 if a page about the code names a file, type or function that does not exist.
 """
 
 import re
@@ -12,7 +12,11 @@ import sys
 import textwrap
 from pathlib import Path
 
-SOURCES = Path(__file__).resolve().parent.parent / "src"
+ROOT = Path(__file__).resolve().parent.parent
+SOURCES = ROOT / "src"
+# The pages about the code, and the folders in which their files may stand: rooms are named without `src`.
+PAGES, FOLDERS = ("ARCHITECTURE.md", "CONTRIBUTING.md"), ("", "src", "src/evolution", "src/problem", "src/problem/figures", "src/scene",
+                                                           "src/fem", "geo")
 
 
 def rooms():
@@ -43,6 +47,19 @@ def purpose(room):
     return re.sub(r"[`\[\]]", "", re.split(r"(?<=\.)\s", about)[0].rstrip("."))
 
 
+def absent():
+    """The links and the words in backticks of the pages that are neither a file nor a name in the code."""
+    code = [path for folder in ("src", "tests", "scripts") for path in (ROOT / folder).rglob("*") if path.suffix in (".rs", ".py")]
+    names = set(re.findall(r"\w+", "\n".join(path.read_text(encoding="utf-8") for path in code)))
+    for page in PAGES:
+        text = re.sub(r"```.*?```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+        links = {(word, False) for word in re.findall(r"\]\(([^)#:]+)\)", text)}
+        for word, is_word in sorted(links | {(word, True) for word in re.findall(r"`([\w./:]+)`", text)}):
+            is_name = is_word and "/" not in word and all(name in names for name in re.findall(r"\w+", word))
+            if not is_name and "NAME" not in word and not any((ROOT / folder / word).exists() for folder in FOLDERS):
+                yield f"error: {page}: `{word}` does not exist"
+
+
 def needed(uses):
     """The arrows to which no other way leads."""
     def reached(room):
@@ -59,8 +76,9 @@ def draw(path):
     names = rooms()
     uses = {room: used(room, names) for room in names}
     wrong = [(room, of) for room in names for of in uses[room] if names.index(of) > names.index(room)]
-    if wrong:
-        sys.exit("\n".join(f"error: src/{room} uses src/{of}, which stands after it in lib.rs" for room, of in wrong))
+    wrong = [f"error: src/{room} uses src/{of}, which stands after it in lib.rs" for room, of in wrong]
+    if wrong := [*wrong, *absent()]:
+        sys.exit("\n".join(wrong))
     figure, axes = plt.subplots(figsize=(9, 0.45 * len(names)), layout="constrained")
     for y, room in enumerate(names):
         axes.text(0, y, room, weight="bold", va="center", ha="right", size=12)

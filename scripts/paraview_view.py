@@ -13,7 +13,7 @@ import sys
 from paraview import simple
 from paraview.simple import SetProperties as setup
 
-# Values that `signorini figures --paraview` found in the run.
+# Values that `signorini plot --paraview` found in the run.
 RUN = {}
 
 # pvbatch knows the path of the script, ParaView's window does not.
@@ -81,7 +81,7 @@ def read(name):
 def main():
     """Builds both views and shows the last frame or the given one."""
     if not os.path.exists(os.path.join(FOLDER, "fields.pvd")):
-        raise RuntimeError(f"no fields.pvd in {FOLDER}: after moving results, repeat " "`signorini figures --paraview`")
+        raise RuntimeError(f"no fields.pvd in {FOLDER}: after moving results, repeat " "`signorini plot --paraview`")
     simple.RemoveViewsAndLayouts()
     fields, contact = read("fields.pvd"), read("contact.pvd")
     left, right = (simple.CreateView("RenderView") for _ in range(2))

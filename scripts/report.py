@@ -26,7 +26,7 @@ import drawing
 from drawing import FAINT, RED, plt, wrapped
 from bars import barred, plain
 from contact_pressure import draw_evolution, draw_pressure
-from figures import FIGURES
+from plot import PICTURES
 from histories import draw_histories
 from limits import limits_of
 from maps import draw_everything, draw_state
@@ -102,7 +102,7 @@ def all_drawn(tasks):
 def pictures(results, everything):
     """Functions that draw the pictures of the page, by name."""
     limits = limits_of([results])
-    return {**{name: partial(draw, results, limits) for name, draw in FIGURES.items()},
+    return {**{name: partial(draw, results, limits) for name, draw in PICTURES.items()},
             "histories": partial(draw_histories, results),
             "contact-evolution": lambda: draw_evolution(everything, limits_of(everything))}
 
@@ -238,7 +238,8 @@ def run_of(summary):
 def timings(summary):
     """The phases of the run with bars, the longest first."""
     wall = summary.get("wall_seconds") or 1.0
-    phases = sorted(summary.get("phases", {}).items(), key=lambda phase: -phase[1])
+    phases = [phase for phase in summary.get("phases", {}).items() if "/" not in phase[0]]
+    phases.sort(key=lambda phase: -phase[1])
     return [("all", wall, "s")] + [(name, float(f"{seconds:.3g}"), "s", round(40 * seconds / wall) * "■")
                                    for name, seconds in phases if seconds >= 1e-3 * wall]
 

@@ -91,7 +91,6 @@ macro_rules! debug_is_message {
 
 pub mod interrupt;
 pub mod memory;
-pub mod phases;
 pub mod printable;
 pub mod python;
 mod suggestion;

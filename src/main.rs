@@ -58,7 +58,10 @@ enum Command {
     Study(command::ScriptArguments),
     /// Print the summaries of runs as a table, aligned or as CSV.
     Table(command::ScriptArguments),
-    /// Draw the figures of runs into their folders; also at other times, as vector graphics, animated (--help).
+    /// Draw pictures of runs into their folders; also at other times, as vector graphics, animated (--help).
+    Plot(command::ScriptArguments),
+    /// The old name of `plot`.
+    #[command(hide = true)]
     Figures(command::ScriptArguments),
     /// Write report.html, a page about a run, into its folder.
     Report(command::ScriptArguments),
@@ -109,7 +112,14 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => command::script("compare", &arguments),
         Command::Study(arguments) => command::script("study", &arguments),
         Command::Table(arguments) => command::script("table", &arguments),
-        Command::Figures(arguments) => command::script("figures", &arguments),
+        Command::Plot(arguments) => command::script("plot", &arguments),
+        Command::Figures(arguments) => {
+            command::tell(
+                "note",
+                "`signorini figures` is now `signorini plot`; the old name will go",
+            );
+            command::script("plot", &arguments)
+        }
         Command::Report(arguments) => command::script("report", &arguments),
         Command::Solvers => command::solvers(),
         Command::Keys { schema, figures } => command::keys(schema, figures),

@@ -3,7 +3,7 @@
 use super::Extremes;
 use crate::{
     estimate::{RecoveredStrains, UNLOADED, at_vertices},
-    evolution::{Choices, Outcome, Phases, RunError, Step, all_steps},
+    evolution::{Choices, Outcome, RunError, Step, all_steps},
     mesh::Mesh,
     petsc::{PetscError, Session},
     problem::{DiscreteProblem, State, Value},
@@ -60,9 +60,8 @@ impl<'a> FewStepRun<'a> {
         followed: &[f64],
     ) -> Result<Self, RunError> {
         let mut history = History::new(instants, triangles);
-        let phases = Phases::default();
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
-        let run = all_steps(session, problem, choices, &phases, &mut observe, None, followed)?;
+        let run = all_steps(session, problem, choices, &mut observe, None, followed)?;
         let outcome = run.outcome;
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;

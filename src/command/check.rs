@@ -1,12 +1,12 @@
 //! `signorini check`: describes a scene without solving it.
 
 use super::{Failure, SceneArguments, ranks::require_one_process, read_mesh, screen::row};
-use comfy_table::presets;
+use comfy_table::{CellAlignment, Table, presets};
 use signorini::{
     accuracy::INSTANTS,
     mesh::{Mesh, extent},
     model::{Material, Plane},
-    output::terminal::{self, plain, say},
+    output::terminal::{plain, say},
     problem::{Collapse, DiscreteProblem},
     scene::{Boundary, Condition, Scene, Stepping, Units, rounded},
 };
@@ -85,24 +85,22 @@ fn boundaries(scene: &Scene, mesh: &Mesh) -> String {
             straight if straight > 0.1 => format!("about ({x:.2}, {y:.2})"),
             _ => String::new(),
         };
-        [
-            ("  boundary", format!("  {name}")),
-            ("conditions", conditions),
-            ("edges", edges.len().to_string()),
-            (&*measure, plain(length, 5)),
-            ("outward normal", normal),
-        ]
+        [format!("  {name}"), conditions, edges.len().to_string(), plain(length, 5), normal]
     };
-    let mut rows = Vec::new();
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header(["  boundary", "conditions", "edges", &measure, "outward normal"]);
     for boundary in &scene.boundaries {
         let edges = mesh.edges_of(&boundary.name);
         free.retain(|edge| !edges.contains(edge));
         let conditions = conditions(boundary, edges, mesh, &times, &scene.units.length);
-        rows.push(row(&boundary.name, edges, conditions));
+        table.add_row(row(&boundary.name, edges, conditions));
     }
-    rows.push(row("(all other)", &free, "free".to_owned()));
-    let table = terminal::table(presets::NOTHING, rows, 2);
-    table.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
+    table.add_row(row("(all other)", &free, "free".to_owned()));
+    for numbers in table.column_iter_mut().skip(2) {
+        numbers.set_cell_alignment(CellAlignment::Right);
+    }
+    table.to_string().lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }
 
 /// The conditions on a boundary in words, with the range of its gap at `times`.

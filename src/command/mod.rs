@@ -12,7 +12,6 @@ mod ending;
 mod export;
 mod figures;
 mod new;
-mod profile;
 mod provenance;
 mod ranks;
 mod recorder;

@@ -35,7 +35,7 @@ pub fn new(name: &Path) -> Result<(), Failure> {
     let [word, folder] = [&scene, &results].map(|path| quoted(path));
     say(&format!(
         "{} and {} are written; next:\n  signorini check {word}\n  signorini run {word}\n  \
-         signorini figures {folder}",
+         signorini plot {folder}",
         geometry.display(),
         scene.display()
     ));

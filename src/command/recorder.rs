@@ -3,7 +3,7 @@
 use super::{
     checkpoint::{self, Checkpoint, Recorded},
     figures::LastFigures,
-    profile, screen,
+    screen,
     summary::summary,
     task::Task,
 };
@@ -18,6 +18,7 @@ use signorini::{
         terminal::{Progress, say},
         write_whole,
     },
+    petsc::stage,
     scene::{APART, Stepping, rounded},
 };
 use std::{path::Path, time::Instant};
@@ -30,8 +31,8 @@ const FRAMES: usize = 20;
 pub(super) struct Recorder<'a> {
     task: &'a Task<'a>,
     fields: FieldWriter,
-    /// The progress; only the first rank has it.
-    bar: Option<Progress>,
+    /// The progress bar; only the first rank has it.
+    progress: Option<Progress>,
     /// `history.csv`; only the first rank writes it.
     history: Table,
     /// The numbers of the figures that a [`StepRecord`] does not have: the columns after it.
@@ -45,7 +46,8 @@ impl<'a> Recorder<'a> {
     /// A recorder for a new run. Shows a description of the task.
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
-        let bar = task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
+        let progress =
+            task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
         let saved = Instant::now();
         let of_record = json!(StepRecord::default());
         let figures = task.problem.figures.iter().enumerate();
@@ -54,7 +56,7 @@ impl<'a> Recorder<'a> {
         let more = added.iter().map(|&number| task.problem.figures[number].name.as_str());
         let more = Vec::from_iter(more.chain(["seconds"]));
         let history = Table::new(task.folder.join("history.csv"), &StepRecord::default(), &more)?;
-        Ok(Self { task, fields, bar, history, added, last: None, saved })
+        Ok(Self { task, fields, progress, history, added, last: None, saved })
     }
 
     /// Continues from a checkpoint and shows its time.
@@ -65,7 +67,7 @@ impl<'a> Recorder<'a> {
         self.fields.resume(&recorded.fields);
         self.history.resume(recorded.history);
         self.last = Some(run.last().clone());
-        if self.bar.is_none() {
+        if self.progress.is_none() {
             return Ok(());
         }
         let record = &run.last().record;
@@ -123,9 +125,9 @@ impl<'a> Recorder<'a> {
                 return started;
             }
         }
-        let written = self.task.phases.time("output", || {
+        let written = stage("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
-            self.bar.iter_mut().for_each(|bar| screen::progress(bar, &step.record, end));
+            self.progress.iter_mut().for_each(|of| screen::progress(of, &step.record, end));
             let row = match comm.is_root() {
                 true => {
                     let added = self.added.iter().map(|&number| step.figures[number].value);
@@ -150,11 +152,11 @@ impl<'a> Recorder<'a> {
         let (task, last) = (self.task, self.last.take());
         let written = match &last {
             Some(Step { state, .. }) if self.fields.last_time() != Some(state.time) => {
-                task.phases.time("output", || self.fields.add(&task.problem, state))
+                stage("output", || self.fields.add(&task.problem, state))
             }
             _ => Ok(()),
         };
-        let written = written.and(task.phases.time("output", || self.fields.complete()));
+        let written = written.and(stage("output", || self.fields.complete()));
         let problem = &task.problem;
         let extremes = last.iter().map(|step| {
             Extremes::of(problem, &step.state, &step.figures, &task.accuracy.measured)
@@ -174,7 +176,7 @@ impl<'a> Recorder<'a> {
         }
         let memory = task.problem.body.nodes.partition.comm().total(1e-6 * memory::peak());
         // Only the first rank goes on from here.
-        let Some(bar) = &self.bar else { return written };
+        let Some(progress) = &self.progress else { return written };
 
         let record = last.as_ref().map(|step| step.record);
         let figures = last.as_ref().map(|step| LastFigures::new(task, step, &extremes, outcome));
@@ -184,13 +186,10 @@ impl<'a> Recorder<'a> {
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
         }
-        let shown = if task.profile { &notes } else { &notes[..warnings] };
+        let shown = &notes[..warnings];
         let mut lines = screen::conclusion(task, record, figures.as_ref(), result, shown);
-        if task.profile {
-            lines.extend(profile::table(task.phases, wall));
-        }
         lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB")));
-        bar.finish();
+        progress.finish();
         say(&lines.join("\n"));
         written
     }
@@ -201,7 +200,7 @@ impl Observer for Recorder<'_> {
         self.write(step)?;
         let seconds = self.task.problem.scene().output.checkpoint;
         // The first rank decides by its clock.
-        let due = self.bar.is_some() && self.saved.elapsed().as_secs_f64() > seconds;
+        let due = self.progress.is_some() && self.saved.elapsed().as_secs_f64() > seconds;
         Ok(match received() {
             Some(signal) => Next::End(signal),
             None if due && seconds > 0.0 => Next::Checkpoint,

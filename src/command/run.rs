@@ -16,12 +16,12 @@ use clap::Args;
 use signorini::{
     accuracy::{AdaptError, LoopState},
     estimate::Simulation,
-    evolution::{Outcome, Phases, RunError},
+    evolution::{Outcome, RunError},
     interrupt::Interrupts,
     linear::LinearSolver,
     mesh::Mesh,
     output::{self, terminal::say},
-    petsc::{Communicator, Session},
+    petsc::{Communicator, Session, stage},
     problem::DiscreteProblem,
     scene::Scene,
 };
@@ -44,13 +44,14 @@ pub struct RunArguments {
         SOLVERS.join(", "), SOLVERS[0]
     ))]
     solver: Option<String>,
-    /// Print a closing table of phases (time, time per call, bytes moved) and all notes, also minor ones.
-    #[arg(long)]
-    profile: bool,
     /// Measure the error of each figure that the mesh causes: three runs with few steps, on the mesh and on
     /// this mesh bisected everywhere, once and twice (`signorini check` estimates their time). --accuracy includes it.
     #[arg(long)]
     bars: bool,
+    /// Prove a bound on the error of u from the mesh (energy norm), for up to a third of the time of a static solve; --bars and
+    /// --accuracy include it.
+    #[arg(long)]
+    bound: bool,
     /// Continue the same run from its last checkpoint, with the same results bit by bit; without a
     /// checkpoint start from the beginning.
     #[arg(long)]
@@ -124,12 +125,11 @@ fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
 
 /// `signorini run SCENE`, on the ranks that `mpiexec` has started.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
-    let (started, phases) = (Instant::now(), Phases::default());
+    let started = Instant::now();
     let checked = arguments.check();
     let options = if checked.is_ok() { &arguments.petsc[..] } else { &[] };
-    let session = phases.time("petsc start", || Session::start(options))?;
-    let task =
-        agree(session.comm(), checked).and_then(|()| read(arguments, &session, &phases, started));
+    let session = stage("petsc start", || Session::start(options))?;
+    let task = agree(session.comm(), checked).and_then(|()| read(arguments, &session, started));
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|(task, restart)| solve(task, restart, &session));
     let mut unused = session.unused_options();
@@ -159,12 +159,11 @@ fn warn_of_checkpoint(folder: &Path) {
 fn read<'a>(
     arguments: &'a RunArguments,
     session: &Session,
-    phases: &'a Phases,
     started: Instant,
 ) -> Result<(Task<'a>, Option<Checkpoint>), Failure> {
     let comm = session.comm();
     let (mut scene, notes) = agree(comm, arguments.read())?;
-    let mesh = phases.time("mesh", || read_shared(comm, &scene))?;
+    let mesh = stage("mesh", || read_shared(comm, &scene))?;
     let folder = arguments.folder(&scene);
     let as_run = scene.as_run();
     agree(comm, check_mesh_is_kept(&scene, &folder))?;
@@ -177,12 +176,12 @@ fn read<'a>(
     }
     let saved = restart.as_mut().map(|checkpoint| mem::take(&mut checkpoint.accuracy));
     let _interrupts = Interrupts::defer();
-    let phase = if scene.accuracy.is_some() { "adaptation" } else { "error bars" };
+    let name = if scene.accuracy.is_some() { "adaptation" } else { "error bars" };
     let start = || accuracy_loop(session, &mut scene, mesh, (arguments.bars, saved));
-    let (accuracy, mesh) = agree(comm, phases.time(phase, start))?;
-    let problem = phases.time("discrete problem", || DiscreteProblem::new(scene, mesh));
+    let (accuracy, mesh) = agree(comm, stage(name, start))?;
+    let problem = stage("discrete problem", || DiscreteProblem::new(scene, mesh));
     let problem = agree(comm, problem.map_err(Failure::input))?;
-    let problem = phases.time("partition", || problem.restrict(session));
+    let problem = stage("partition", || problem.restrict(session));
     let problem = agree(comm, problem.map_err(Failure::from))?;
     check_factors(session, &problem)?;
     let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
@@ -191,6 +190,7 @@ fn read<'a>(
         warn_of_checkpoint(&folder);
     }
     let task = Task {
+        bound: arguments.bound || arguments.bars || accuracy.adapted.is_some(),
         triangles: comm.count(problem.body.own_triangles),
         contact_nodes: comm.count(contact_nodes(&problem)),
         problem,
@@ -201,8 +201,6 @@ fn read<'a>(
         _lock: lock,
         _interrupts,
         petsc: &arguments.petsc,
-        profile: arguments.profile,
-        phases,
         started,
     };
     Ok((task, restart))
@@ -274,10 +272,13 @@ fn solve_once<'a>(
 ) -> Result<(Recorder<'a>, Result<Outcome, RunError>), Failure> {
     let comm = session.comm();
     let mut recorder = agree(comm, Recorder::new(task).map_err(Failure::input))?;
-    let (problem, phases) = (&task.problem, task.phases);
+    let problem = &task.problem;
     let resumed = restart.as_ref().map_or(Ok(()), |checkpoint| recorder.resume(checkpoint));
     agree(comm, resumed.map_err(Failure::from))?;
-    let mut simulation = Simulation::new(problem).phases(phases).observer(&mut recorder);
+    let mut simulation = Simulation::new(problem).observer(&mut recorder);
+    if task.bound {
+        simulation = simulation.bound();
+    }
     if let Some(checkpoint) = restart {
         simulation = simulation.resume(checkpoint.run);
     }

@@ -202,7 +202,7 @@ fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
     .collect()
 }
 
-/// The lines of contact, of all of it and of each of several foundations.
+/// The lines of contact: of the whole contact and, if there are several foundations, of each.
 fn contact(task: &Task, last: StepRecord, figures: &LastFigures) -> Vec<String> {
     let foundations = &task.problem.foundations[..];
     if foundations.is_empty() {

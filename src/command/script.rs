@@ -1,4 +1,4 @@
-//! `signorini figures`, `report`, `info` and `compare`: Python scripts embedded in the program.
+//! `signorini plot`, `report`, `info` and `compare`: Python scripts embedded in the program.
 
 use super::{Failure, ranks::require_one_process};
 use clap::Args;

@@ -4,9 +4,9 @@ use super::{figures::LastFigure, provenance::provenance, task::Task};
 use serde_json::{Map, Value, json};
 use signorini::{
     evolution::{Outcome, RunError, StepRecord},
+    petsc::stage_seconds,
     problem::DiscreteProblem,
 };
-use std::collections::BTreeMap;
 
 /// `summary.json` of a run that took `wall` seconds and `memory` MB.
 pub(super) fn summary(
@@ -21,7 +21,6 @@ pub(super) fn summary(
     let (scene, partition) = (problem.scene(), &problem.body.nodes.partition);
     let outcome = result.ok();
     let steps = last.map_or(0, |record| record.step);
-    let seconds = task.phases.parts("").into_iter().map(|(name, phase)| (name, phase.seconds));
     let mut summary = json!({
         "provenance": provenance(problem.mesh().gmsh.as_deref()),
         "scene": scene.name,
@@ -44,7 +43,8 @@ pub(super) fn summary(
         "errors": outcome.map(|outcome| &outcome.errors),
         "wall_seconds": wall,
         "seconds_per_step": wall / steps.max(1) as f64,
-        "phases": seconds.collect::<BTreeMap<_, _>>(),
+        // The wall time of each stage, s; that of `contact` contains its parts, as `contact/products`.
+        "phases": stage_seconds(),
         // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
         "boundaries": problem.boundaries(),
         "units": scene.units,

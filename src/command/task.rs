@@ -1,8 +1,7 @@
 //! The task of a run.
 
 use signorini::{
-    accuracy::LoopState, evolution::Phases, interrupt::Interrupts, problem::DiscreteProblem,
-    scene::AsRun,
+    accuracy::LoopState, interrupt::Interrupts, problem::DiscreteProblem, scene::AsRun,
 };
 use std::{fs::File, path::PathBuf, time::Instant};
 
@@ -19,6 +18,8 @@ pub struct Task<'a> {
     pub as_run: AsRun,
     /// The adapted mesh and the measured errors.
     pub accuracy: LoopState,
+    /// Is a proved bound on the error of u asked for?
+    pub bound: bool,
     /// Notes on the arguments.
     pub notes: Vec<String>,
     /// The lock of the folder against other runs.
@@ -26,8 +27,5 @@ pub struct Task<'a> {
     /// Signals are deferred from the first run on, whichever follows.
     pub _interrupts: Interrupts,
     pub petsc: &'a [String],
-    /// Whether to print the table of phases.
-    pub profile: bool,
-    pub phases: &'a Phases,
     pub started: Instant,
 }

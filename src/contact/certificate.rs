@@ -1,7 +1,8 @@
 //! Certifies an answer in global coordinates, by the conditions of the scene.
 //!
-//! This code shares nothing with the solvers: no nodal basis, no bound on an unknown, no mask of prescribed
-//! unknowns. A fault in any of these makes u wrong, and the certificate shows it.
+//! This code uses no nodal basis, no bound on an unknown and no mask of prescribed unknowns of the solvers. A fault in any of these
+//! makes u wrong, and the certificate shows it. The forces f − Ku come in from [`Elasticity`](crate::fem::Elasticity), whose comment
+//! says what solvers share with it.
 
 use super::{Kkt, NodalConstraint, Scales};
 use crate::{ROUNDING, fem::Subdomain, maximum, petsc::Communicator};
@@ -258,9 +259,9 @@ fn cone(
             best = (all, rest, work);
         }
     };
-    for (place, &i) in bearing.iter().enumerate() {
+    for (index, &i) in bearing.iter().enumerate() {
         offer(&[(i, (normals[i].dot(&force) / normals[i].norm_squared()).max(0.0))]);
-        for &j in &bearing[..place] {
+        for &j in &bearing[..index] {
             let area = normals[i].perp(&normals[j]);
             let (p, q) = (force.perp(&normals[j]) / area, normals[i].perp(&force) / area);
             if p > 0.0 && q > 0.0 {

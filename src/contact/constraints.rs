@@ -159,7 +159,7 @@ impl Constraints {
         self.prescribed.iter().map(|&(dof, _)| dof)
     }
 
-    /// The place in `bounds` of the unknown on which a contact force along `normal` acts at `node`.
+    /// The index in `bounds` of the unknown on which a contact force along `normal` acts at `node`.
     pub fn bound_along(&self, node: usize, normal: [f64; 2]) -> Option<usize> {
         let first = self.bounds.partition_point(|bound| bound.node < node);
         let at_node = (first..self.bounds.len()).take_while(|&i| self.bounds[i].node == node);
@@ -207,8 +207,8 @@ impl Constraints {
                 }
                 continue;
             };
-            let Ok(place) = bounds.binary_search_by_key(&dof, |bound| bound.dof) else { continue };
-            let Bound { lower, upper, .. } = &mut bounds[place];
+            let Ok(index) = bounds.binary_search_by_key(&dof, |bound| bound.dof) else { continue };
+            let Bound { lower, upper, .. } = &mut bounds[index];
             if b > 0.0 {
                 *upper = upper.min(room / b)
             } else {

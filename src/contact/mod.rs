@@ -6,8 +6,8 @@
 //!
 //! [`Constraints`] chooses unknowns c such that each contact condition bounds one of them. [`RigidMotions`]
 //! finds the null space of K. A [`ContactSolver`] solves a [`ContactProblem`]; [`solvers()`] makes one of
-//! [`REGISTRY`] by its name. The [`Certificate`] computes the KKT residuals of u and shares no code with the
-//! solvers.
+//! [`REGISTRY`] by its name. The [`Certificate`] computes the KKT residuals of u without the bases, bounds
+//! and matrices of the solvers.
 
 mod certificate;
 mod constraints;

@@ -5,7 +5,6 @@ use crate::{
     linear::LinearSystem,
     maximum,
     petsc::{Communicator, Matrix, PetscError, Session, Vector},
-    phases::Phases,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -36,18 +35,12 @@ pub struct ContactProblem<'a> {
     /// The ranks among which the unknowns are divided. The owner of an unknown knows its bound. All ranks
     /// decide together.
     pub comm: Communicator,
-    /// The phases `contact/…` to which the parts of the solve add their time.
-    pub phases: &'a Phases,
 }
 
 impl ContactProblem<'_> {
     /// K c = f on all unknowns.
     pub(super) fn system(&self) -> LinearSystem<'_> {
-        LinearSystem {
-            scale: self.stiffness_scale,
-            phases: Some(self.phases),
-            ..LinearSystem::of(self.stiffness)
-        }
+        LinearSystem { scale: self.stiffness_scale, ..LinearSystem::of(self.stiffness) }
     }
 
     /// The same with unknowns prescribed, all of them bounded.

@@ -1,6 +1,6 @@
 //! The computation of the error budget.
 
-use super::equilibrated::Unproved;
+use super::equilibrated::{ProvedError, Unproved};
 use crate::{
     evolution::{ErrorBudget, Outcome},
     problem::{DiscreteProblem, State},
@@ -8,23 +8,28 @@ use crate::{
 use nalgebra::DVector;
 
 impl ErrorBudget {
-    /// The budget of the last accepted state, from the error of its ζ by the `steps` and its error bar, and from the proved error
-    /// of u with what the proof leaves out, or the reason why there is none. Collective.
+    /// The budget of the last accepted state, from the error of its ζ by the `steps` and its error bar, and from the `proof` of the
+    /// error of u, if it was asked for. Collective.
     pub(super) fn new(
         problem: &DiscreteProblem,
         outcome: &Outcome,
         steps: Option<[DVector<f64>; 2]>,
-        proof: Result<(f64, Vec<&'static str>), Unproved>,
+        proof: Option<Result<ProvedError, Unproved>>,
     ) -> Self {
         let (accuracy, state) = (&outcome.accuracy, &outcome.last.state);
         let caused = |error: &[f64]| displacement_error_of(problem, error, state);
         let error = steps.as_ref().map(|[error, _]| error.as_slice());
+        let (bound, reservations) = match proof {
+            Some(Ok(proof)) => (Some(proof.relative), proof.left_out),
+            Some(Err(reason)) => (None, vec![reason]),
+            None => (None, Vec::new()),
+        };
         let bars = |[_, bar]: &[DVector<f64>; 2]| (bar.clone(), caused(bar.as_slice()));
         Self {
             displacement_mesh: accuracy.energy,
             is_measured: false,
-            displacement_bound: proof.as_ref().ok().map(|(bound, _)| *bound),
-            reservations: proof.map_or_else(|reason| vec![reason], |(_, left_out)| left_out),
+            displacement_bound: bound,
+            reservations,
             damage_mesh: None,
             displacement_steps: error.map(caused),
             damage_steps: error.and_then(|error| relative_to_damage(problem, error, state)),

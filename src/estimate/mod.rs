@@ -4,7 +4,7 @@
 //!
 //! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
 //!   (the same strains give the [`NodalStress`](crate::problem::NodalStress) of pictures);
-//! - [`EquilibratedStress`]: a proved bound on the error of u from the mesh;
+//! - [`EquilibratedStress`]: a proved bound on the error of u from the mesh, if it is asked for ([`Simulation::bound`]);
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
 //! What crosses the door: a [`Simulation`] calls `evolution`, takes its last state, some earlier states and its factor of K,
@@ -23,37 +23,36 @@ pub use simulation::Simulation;
 
 use crate::{
     evolution::{ErrorBudget, Outcome, Run, RunError},
-    petsc::PetscError,
+    petsc::{PetscError, stage},
     problem::{DiscreteProblem, State},
 };
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 pub(crate) const UNLOADED: f64 = 0.01;
 
-/// Estimates the errors of a finished run and enters them in its outcome. Collective.
-fn estimated(run: Run) -> Result<Outcome, RunError> {
+/// Estimates the errors of a finished run, with a proved bound on that of u if it is `asked`, and enters them in its outcome.
+/// Collective.
+fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
     let Run { mut damage_step, mut contact_step, mut controller, mut outcome } = run;
-    let (problem, phases) = (damage_step.problem, damage_step.phases);
-    outcome.accuracy = phases.time("accuracy", || contact_step.accuracy(&outcome))?;
-    outcome.accuracy.energy = phases.time("accuracy", || energy_error(problem, &outcome))?;
+    let problem = damage_step.problem;
+    outcome.accuracy = stage("accuracy", || contact_step.accuracy(&outcome))?;
+    outcome.accuracy.energy = stage("accuracy", || energy_error(problem, &outcome))?;
     let state = representative(&outcome).clone();
-    let proof = phases.time("proof", || {
-        equilibrated::proved_error(&mut contact_step, &state, outcome.accuracy.energy)
-    })?;
-    if let Ok(proof) = &proof
+    let prove = || equilibrated::proved_error(&mut contact_step, &state, outcome.accuracy.energy);
+    let proof = asked.then(|| stage("proof", prove)).transpose()?;
+    if let Some(Ok(proof)) = &proof
         && proof.left_out.is_empty()
     {
         outcome.accuracy.energy = outcome.accuracy.energy.min(proof.relative);
     }
-    outcome.penetration = phases.time("accuracy", || {
+    outcome.penetration = stage("accuracy", || {
         problem.penetration_note(&[&outcome.most_displaced().state, &outcome.last.state])
     });
     let is_known = problem.damage().is_some()
         && outcome.stopped.is_none()
         && controller.add_last_error(&mut damage_step).is_ok();
     let steps = is_known.then(|| [controller.step_error(), controller.step_bar()]);
-    outcome.errors =
-        ErrorBudget::new(problem, &outcome, steps, proof.map(|of| (of.relative, of.left_out)));
+    outcome.errors = ErrorBudget::new(problem, &outcome, steps, proof);
     Ok(outcome)
 }
 

@@ -38,14 +38,14 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, Phases, RunError, State, Step, StepFailure, StepRecord,
-    agreed, extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, RunError, State, Step, StepFailure, StepRecord, agreed,
+    extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
-    petsc::{PetscError, Session, Vector},
+    petsc::{PetscError, Session, Vector, stage},
     problem::SHOWN_AS_ZERO,
 };
 use certificate::Candidate;
@@ -60,7 +60,6 @@ use std::{ops::RangeInclusive, time::Instant};
 pub struct ContactStep<'a> {
     session: &'a Session,
     problem: &'a DiscreteProblem,
-    phases: &'a Phases,
     /// The chosen solver, then the one for steps in which it stops short of the tolerance, if there is one.
     solvers: Vec<SharedSolver>,
     /// Solves the linear systems of all solvers.
@@ -122,11 +121,10 @@ impl<'a> ContactStep<'a> {
         session: &'a Session,
         problem: &'a DiscreteProblem,
         choices: &Choices,
-        phases: &'a Phases,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
         let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
-        let stiffness = phases.time("stiffness pattern", || {
+        let stiffness = stage("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
         let options = &problem.scene().contact;
@@ -144,7 +142,6 @@ impl<'a> ContactStep<'a> {
         Ok(Self {
             session,
             problem,
-            phases,
             solvers,
             elastic: LinearSolver::new(session, contact::ELASTIC, unknowns, precision)?,
             stiffness,
@@ -172,17 +169,16 @@ impl<'a> ContactStep<'a> {
     /// The solver failed, or neither its answers nor its rescuer's met the KKT tolerance.
     pub fn solve(&mut self, step: usize, time: f64, zeta: &[f64]) -> Result<Step, RunError> {
         let started = Instant::now();
-        let (problem, phases) = (self.problem, self.phases);
+        let problem = self.problem;
         self.set_damage(zeta);
         let comm = problem.body.nodes.partition.comm();
-        let case = agreed(comm, phases.time("loads", || problem.load_case(time)))?;
+        let case = agreed(comm, stage("loads", || problem.load_case(time)))?;
         let mut attempt = self.first_attempt(0, &case)?;
         let candidate = loop {
             let decision = match self.minimise(&mut attempt, &case) {
                 Ok((u, stopped)) => {
                     let reference = &attempt.next.reference;
-                    let candidate =
-                        phases.time("certificate", || self.certify(reference, u, &case));
+                    let candidate = stage("certificate", || self.certify(reference, u, &case));
                     self.decide(attempt, stopped, candidate, &case)?
                 }
                 Err(error) => self.give_up(attempt, error, &case)?,
@@ -207,7 +203,7 @@ impl<'a> ContactStep<'a> {
         let problem = self.problem;
         let zeta_at_points = problem.zeta_at_points(zeta);
         if problem.body.nodes.partition.comm().any(zeta_at_points != self.zeta_at_points) {
-            self.phases.time("stiffness", || {
+            stage("stiffness", || {
                 self.stiffness.set_damage(&problem.body, &zeta_at_points);
             });
             self.zeta_at_points = zeta_at_points;
@@ -248,9 +244,8 @@ impl<'a> ContactStep<'a> {
         self.next = next;
         let mut state = State { time, u, zeta: zeta.to_vec(), contact, prescribed };
         problem.share_reactions(&mut state, &unbalanced, rounding);
-        let (observation, figures) = self
-            .phases
-            .time("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
+        let (observation, figures) =
+            stage("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
         let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);
         record.seconds = started.elapsed().as_secs_f64();
         if !(0.0..=MAX_DISPLACEMENT).contains(&record.displacement_max) {
@@ -289,7 +284,7 @@ impl<'a> ContactStep<'a> {
         let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
         let mut c = self.c.read(<[f64]>::to_vec)?;
         self.next.reference.translate(&problem.constraints, &mut c, 1.0);
-        self.phases.time("extrapolation", || self.extrapolation.accept(comm, time, c));
+        stage("extrapolation", || self.extrapolation.accept(comm, time, c));
         self.accepted = self.next.clone();
         Ok(())
     }
@@ -322,7 +317,7 @@ impl<'a> ContactStep<'a> {
             // It cannot use the warm start of another solver.
             next.warm_start.clear();
         }
-        self.phases.time("extrapolation", || {
+        stage("extrapolation", || {
             let predicted = self.extrapolation.at(case.time);
             let mut c = predicted.unwrap_or_else(|| vec![0.0; self.c.owned()]);
             next.reference.translate(constraints, &mut c, -1.0);

@@ -1,11 +1,11 @@
 //! The damage step (28): ζ_n from ζ_{n−1} and u_{n−1}.
 
-use super::{DiscreteProblem, Phases, RunError, Step, StepFailure, agreed};
+use super::{DiscreteProblem, RunError, Step, StepFailure, agreed};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     linear::FactorState,
     model::ChosenSource,
-    petsc::{PetscError, Session},
+    petsc::{PetscError, Session, stage},
 };
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,6 @@ impl PlannedStep {
 pub(crate) struct DamageStep<'a> {
     pub(crate) session: &'a Session,
     pub(crate) problem: &'a DiscreteProblem,
-    pub(crate) phases: &'a Phases,
     pub(crate) law: &'a ChosenSource,
     /// k and M + kκL, made by the first step that needs it.
     pub(crate) system: Option<(f64, DamageSystem)>,
@@ -85,7 +84,7 @@ impl DamageStep<'_> {
         let Some(laws) = problem.damage() else {
             return Ok(SourceLoad { load: DVector::zeros(state.zeta.len()), min: 0.0 });
         };
-        self.phases.time("damage source", || {
+        stage("damage source", || {
             let comm = body.vertices.partition.comm();
             let phi = fem::source(body, (self.law, laws), &strains, &state.zeta);
             let failed = |source| RunError::Step {
@@ -107,7 +106,7 @@ impl DamageStep<'_> {
     /// # Errors
     /// The system has no finite solution, or was solved too inaccurately.
     pub(crate) fn solve(&mut self, planned: &PlannedStep) -> Result<DamageUpdate, RunError> {
-        let (problem, phases) = (self.problem, self.phases);
+        let problem = self.problem;
         let partition = &problem.body.vertices.partition;
         let (start, load) = (planned.start.as_slice(), planned.load.as_slice());
         let (mut zeta, min_max) = (planned.start.clone(), partition.min_max(start));
@@ -115,12 +114,12 @@ impl DamageStep<'_> {
             return Ok(DamageUpdate { zeta, min_max, certificate: None });
         }
         let system = self.system(planned.k)?;
-        if !phases.time("damage solve", || system.advance(load, zeta.as_mut_slice()))? {
+        if !stage("damage solve", || system.advance(load, zeta.as_mut_slice()))? {
             return Err(planned.failed(StepFailure::Damage));
         }
         let largest_residual = system.largest_residual();
         partition.update(zeta.as_mut_slice(), 1)?;
-        let certificate = phases.time("damage certificate", || {
+        let certificate = stage("damage certificate", || {
             let (body, mass, fields) = (&problem.body, problem.mass(), [start, zeta.as_slice()]);
             DamageCertificate::of(body, mass, &problem.diffusions(), planned.k, load, fields)
         });
@@ -146,12 +145,12 @@ impl DamageStep<'_> {
         planned: &PlannedStep,
         load: &[f64],
     ) -> Result<Option<DVector<f64>>, RunError> {
-        let (partition, phases) = (&self.problem.body.vertices.partition, self.phases);
+        let partition = &self.problem.body.vertices.partition;
         if self.is_zero(load) {
             return Ok(Some(DVector::zeros(planned.start.len())));
         }
         let system = self.system(planned.k)?;
-        let Some(change) = phases.time("damage solve", || system.correction(load))? else {
+        let Some(change) = stage("damage solve", || system.correction(load))? else {
             return Ok(None);
         };
         let change = partition.field(change, 1)?;
@@ -189,18 +188,18 @@ impl DamageStep<'_> {
 
     /// The damage system of a step of `k` s, with a factor that still pays.
     fn system(&mut self, k: f64) -> Result<&mut DamageSystem, PetscError> {
-        let (session, problem, phases) = (self.session, self.problem, self.phases);
+        let (session, problem) = (self.session, self.problem);
         let mut system = match self.system.take() {
             Some((own, system)) if own == k => system,
             Some((_, mut system)) => {
-                phases.time("damage matrix", || system.set_step(k))?;
+                stage("damage matrix", || system.set_step(k))?;
                 system
             }
             None => {
                 let (body, mass, diffusions) =
                     (&problem.body, problem.mass(), problem.diffusions());
                 let new = || DamageSystem::new(session, body, mass, &diffusions, k);
-                let mut system = phases.time("damage matrix", new)?;
+                let mut system = stage("damage matrix", new)?;
                 if let Some(state) = self.loaded.take() {
                     system.factor().set_state(state);
                 }
@@ -208,7 +207,7 @@ impl DamageStep<'_> {
             }
         };
         if system.factor().is_due() {
-            phases.time("damage factor", || system.factorise())?;
+            stage("damage factor", || system.factorise())?;
         }
         Ok(&mut self.system.insert((k, system)).1)
     }

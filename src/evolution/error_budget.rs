@@ -13,9 +13,9 @@ pub struct ErrorBudget {
     /// Is it measured?
     #[serde(skip)]
     pub is_measured: bool,
-    /// A proved bound on this error, for the given ζ; `None` if there is none.
+    /// A proved bound on this error, for the given ζ; `None` if there is none or it was not asked for.
     pub displacement_bound: Option<f64>,
-    /// What the proof leaves out, or the reason why there is none.
+    /// The data of the scene that the proof leaves out, or the reason why a proof that was asked for is not possible.
     #[serde(skip)]
     pub reservations: Vec<&'static str>,
     /// The error of the damage from the mesh; `None` if it is not measured, and if the run stopped at ζ_*, where it grows
@@ -47,11 +47,12 @@ impl ErrorBudget {
         self.is_measured = measured > 0.0;
     }
 
-    /// The error of u from the mesh: the proved bound, beside it the measured error, or the estimate.
+    /// The error of u from the mesh: the proved bound, beside it the measured error, or the estimate from recovered strains.
     fn of_displacements(&self) -> String {
         let (estimate, reservations) =
             (percent(self.displacement_mesh), self.reservations.join(", "));
         let proved = if self.can_be_damaged { "proved for this ζ" } else { "proved" };
+        let found = if self.is_measured { "measured" } else { "estimated" };
         let error = match (self.displacement_bound, &reservations[..]) {
             (Some(bound @ 1.0..), "") => format!(
                 "at most {} (energy norm, {proved}): useless, the mesh is too coarse, its triangles are too \
@@ -63,8 +64,8 @@ impl ErrorBudget {
                 "about {} (energy norm, a bound without proof, as {left_out})",
                 percent(bound)
             ),
-            (None, "") => format!("{estimate} (energy norm)"),
-            (None, reason) => format!("{estimate} (energy norm, estimated: no proof, as {reason})"),
+            (None, "") => format!("{estimate} (energy norm, {found})"),
+            (None, reason) => format!("{estimate} (energy norm, {found}: no proof, as {reason})"),
         };
         // Beside a measured error, only a useful proof says more.
         let is_proof =

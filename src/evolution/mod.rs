@@ -39,7 +39,6 @@ mod state;
 mod step_controller;
 
 pub use crate::contact::ContactPoint;
-pub use crate::phases::Phases;
 pub use crate::problem::{ContactRow, DiscreteProblem, Loads, SetupError, State, Supports};
 pub use choices::Choices;
 pub use contact_step::{Accuracy, ContactStep};
@@ -56,7 +55,7 @@ pub(crate) use step_controller::StepController;
 use crate::{
     linear::FactorState,
     model::ChosenSource,
-    petsc::{Communicator, Session},
+    petsc::{Communicator, Session, stage},
     problem::{LoadCase, LoadCurve},
 };
 use contact_step::ContactState;
@@ -74,7 +73,6 @@ pub(crate) fn all_steps<'a>(
     session: &'a Session,
     problem: &'a DiscreteProblem,
     choices: &'a Choices,
-    phases: &'a Phases,
     observer: &mut dyn Observer,
     saved: Option<RunState>,
     followed: &'a [f64],
@@ -83,8 +81,8 @@ pub(crate) fn all_steps<'a>(
     if matches!(law, ChosenSource::Own(_)) && problem.damage().is_none() {
         return Err(RunError::NoDamage);
     }
-    let damage_step = DamageStep { session, problem, phases, law, system: None, loaded: None };
-    let mut contact_step = ContactStep::new(session, problem, choices, phases)?;
+    let damage_step = DamageStep { session, problem, law, system: None, loaded: None };
+    let mut contact_step = ContactStep::new(session, problem, choices)?;
     let (zeta, start) = (problem.initial_damage(), problem.scene().start());
     let (mut first, mut source) = Default::default();
     if saved.is_none() {
@@ -158,7 +156,7 @@ impl Run<'_> {
         let wanted = observer.accept(&self.outcome.last).map_err(RunError::Observer);
         let next = Next::of_urgency(comm.max(agreed(comm, wanted)?.urgency()));
         if next != Next::Step {
-            let kept = self.damage_step.phases.time("checkpoint", || {
+            let kept = stage("checkpoint", || {
                 observer.keep(RunState {
                     contact: self.contact_step.state(),
                     damage_factor: self.damage_step.factor_state(),

@@ -129,7 +129,7 @@ impl StepRecord {
             step,
             time: state.time,
             zeta_min: observation.zeta_min.value,
-            zeta_mean: problem.body.mean(&state.zeta),
+            zeta_mean: observation.zeta_mean,
             displacement_max: observation.displacement_max.value,
             work: observation.work,
             contact_force: observation.contact_force,

@@ -54,11 +54,11 @@ impl DamageCertificate {
         let [squares, rhs, balance, weighted, above] = sums;
         let (balance, least) = (balance.abs() / body.area, comm.min(least));
         let rounding = f64::EPSILON * body.vertices.partition.total() as f64 * comm.max(largest);
-        let factor = match mass {
+        let ratio = match mass {
             Mass::Consistent => 4.0,
             Mass::Lumped => 1.0,
         };
-        let bound = |weighted: f64| factor * (weighted / least).sqrt();
+        let bound = |weighted: f64| ratio * (weighted / least).sqrt();
         Self {
             residual: (squares / rhs.max(f64::MIN_POSITIVE)).sqrt(),
             balance,

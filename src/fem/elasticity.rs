@@ -10,7 +10,9 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 /// Stresses, internal forces and energies of a displacement field, triangle by triangle. `zeta` are the values of ζ at the
 /// quadrature points, [`Body::at_points`].
 ///
-/// Solvers use its sums over elements. The certificate and the error estimates use the other methods, which share no code with it.
+/// Solvers multiply by K with `sums`; the certificate and the error estimates use the other methods. These loops are
+/// independent of each other; both take the gradients of the elements, D and ζ at the quadrature points as they are here, so a fault in
+/// these is seen by neither. (Solvers also take f − K u_D of prescribed displacements from [`Self::internal_force`].)
 #[derive(Debug, Clone, Default)]
 pub struct Elasticity {
     /// The materials by their numbers, and A of each as the matrix D of [`Material::stiffness`], Pa.

@@ -28,7 +28,8 @@ pub(crate) struct Patches {
     owned: usize,
     /// The number of quadrature points in a triangle.
     pub(crate) per_triangle: usize,
-    /// At a jump of a load strains differ by the angle, at any distance: these vertices take the mean. See [`Body`].
+    /// Per vertex: is it next to a jump of a load? Around the jump the strain depends on the direction at any distance, so no
+    /// polynomial fits it, and the vertex takes the mean of its triangles' strains. See [`Body`].
     near_jumps: Vec<bool>,
     /// Per material: its triangles around each vertex.
     around: Vec<TrianglesAround>,
@@ -40,30 +41,30 @@ struct TrianglesAround {
     triangles: Vec<usize>,
     /// Per vertex: where its triangles start in the list; then the end.
     starts: Vec<usize>,
-    /// Per quadrature point of the triangles in the list: the factors of its strain in the coefficients of the fit. There are 3
+    /// Per quadrature point of the triangles in the list: the weights of its strain in the coefficients of the fit. There are 3
     /// for linear and 6 for quadratic elements.
-    factors: Vec<f64>,
+    weights: Vec<f64>,
     /// The vertices of this rank with too few triangles, if any.
     few: Vec<usize>,
 }
 
 impl TrianglesAround {
-    /// The triangles of a `material` of the body, without factors.
+    /// The triangles of a `material` of the body, without weights.
     fn new(body: &Body, material: usize) -> Self {
         let triangles = body.mesh.triangles.iter().enumerate();
         let own = triangles.filter(|(t, _)| body.material(*t) == material);
         let around = own.flat_map(|(t, triangle)| triangle.map(|vertex| (vertex, t)));
         let (starts, triangles) = by_number(body.mesh.nodes.len(), around);
-        Self { triangles, starts, factors: Vec::new(), few: Vec::new() }
+        Self { triangles, starts, weights: Vec::new(), few: Vec::new() }
     }
 
-    /// The places of the triangles of a vertex in the list.
-    fn places(&self, vertex: usize) -> Range<usize> {
+    /// The range of the triangles of a vertex in the list.
+    fn range(&self, vertex: usize) -> Range<usize> {
         self.starts[vertex]..self.starts[vertex + 1]
     }
 
     fn of(&self, vertex: usize) -> &[usize] {
-        &self.triangles[self.places(vertex)]
+        &self.triangles[self.range(vertex)]
     }
 }
 
@@ -82,16 +83,16 @@ impl Patches {
             around: (0..=last).map(|material| TrianglesAround::new(body, material)).collect(),
         };
         for material in 0..=last {
-            let (few, factors) = patches.factors(&patches.around[material], &samples);
-            (patches.around[material].few, patches.around[material].factors) = (few, factors);
+            let (few, weights) = patches.weights(&patches.around[material], &samples);
+            (patches.around[material].few, patches.around[material].weights) = (few, weights);
         }
         patches
     }
 
-    /// The vertices with too few triangles, and the factors of the fits to strains at the `samples`, of as high a degree as the
+    /// The vertices with too few triangles, and the weights of the fits to strains at the `samples`, of as high a degree as the
     /// triangles of a vertex allow.
-    fn factors(&self, around: &TrianglesAround, samples: &[[f64; 2]]) -> (Vec<usize>, Vec<f64>) {
-        let (mut factors, mut few) = (Vec::new(), Vec::new());
+    fn weights(&self, around: &TrianglesAround, samples: &[[f64; 2]]) -> (Vec<usize>, Vec<f64>) {
+        let (mut weights, mut few) = (Vec::new(), Vec::new());
         let (points, count) = (self.per_triangle, if self.per_triangle > 1 { 6 } else { 3 });
         for vertex in 0..self.owned {
             let own = around.of(vertex).iter().flat_map(|t| points * t..points * (t + 1));
@@ -99,14 +100,14 @@ impl Patches {
             let has_own = self.has_own_fit(around, vertex);
             few.extend((!has_own && !around.of(vertex).is_empty()).then_some(vertex));
             match (points, has_own) {
-                _ if self.is_near_jump(vertex) => fit::<1>(at, own, count, &mut factors),
-                (1, true) => fit::<3>(at, own, count, &mut factors),
-                (1, false) => fit::<1>(at, own, count, &mut factors),
-                (_, true) => fit::<6>(at, own, count, &mut factors),
-                (_, false) => fit::<3>(at, own, count, &mut factors),
+                _ if self.is_near_jump(vertex) => fit::<1>(at, own, count, &mut weights),
+                (1, true) => fit::<3>(at, own, count, &mut weights),
+                (1, false) => fit::<1>(at, own, count, &mut weights),
+                (_, true) => fit::<6>(at, own, count, &mut weights),
+                (_, false) => fit::<3>(at, own, count, &mut weights),
             }
         }
-        (few, factors)
+        (few, weights)
     }
 
     fn is_near_jump(&self, vertex: usize) -> bool {
@@ -141,12 +142,12 @@ impl Patches {
         partition: Option<&Partition>,
     ) -> Result<Fits, PetscError> {
         let strains = strains.as_chunks::<Q>().0;
-        let factors = around.factors.as_chunks::<C>().0.as_chunks::<Q>().0;
+        let weights = around.weights.as_chunks::<C>().0.as_chunks::<Q>().0;
         let set_own = |fits: &mut Fits, vertex: usize| {
-            let (places, mut sums) = (around.places(vertex), [[0.0; C]; 3]);
-            for (factors, &t) in factors[places.clone()].iter().zip(&around.triangles[places]) {
-                for (factors, strain) in factors.iter().zip(&strains[t]) {
-                    (0..3).for_each(|i| (0..C).for_each(|k| sums[i][k] += factors[k] * strain[i]));
+            let (range, mut sums) = (around.range(vertex), [[0.0; C]; 3]);
+            for (weights, &t) in weights[range.clone()].iter().zip(&around.triangles[range]) {
+                for (weights, strain) in weights.iter().zip(&strains[t]) {
+                    (0..3).for_each(|i| (0..C).for_each(|k| sums[i][k] += weights[k] * strain[i]));
                 }
             }
             fits.set(vertex, SMatrix::<f64, 3, C>::from_fn(|i, k| sums[i][k]).as_slice());
@@ -252,13 +253,13 @@ fn sample_points<const N: usize, const Q: usize>(
     cells.nodes.iter().flat_map(|nodes| values.iter().map(move |v| place(nodes, v))).collect()
 }
 
-/// Adds the `count` factors of each strain at the `samples` in the polynomial about `centre` that is nearest to them, in
+/// Adds the `count` weights of each strain at the `samples` in the polynomial about `centre` that is nearest to them, in
 /// least squares, with the first N coefficients: N is 1, 3 or 6 for the degrees 0, 1, 2.
 fn fit<const N: usize>(
     centre: [f64; 2],
     samples: impl Iterator<Item = [f64; 2]> + Clone,
     count: usize,
-    factors: &mut Vec<f64>,
+    weights: &mut Vec<f64>,
 ) {
     let offset = |x: [f64; 2]| [x[0] - centre[0], x[1] - centre[1]];
     let square = |x: [f64; 2]| offset(x).iter().map(|d| d * d).sum::<f64>();
@@ -272,14 +273,14 @@ fn fit<const N: usize>(
     let rounding = ROUNDING * normal.trace();
     (0..N).for_each(|i| normal[(i, i)] += rounding);
     let Some(factor) = normal.cholesky() else {
-        factors.extend(samples.flat_map(|_| vec![0.0; count]));
+        weights.extend(samples.flat_map(|_| vec![0.0; count]));
         return;
     };
     for x in samples {
         let found = factor.solve(&row(x));
         let scaled = [0, 1, 1, 2, 2, 2].into_iter().zip(found.iter());
         let scaled = scaled.map(|(degree, of)| of * size.powi(-degree));
-        factors.extend(scaled.chain([0.0; 6]).take(count));
+        weights.extend(scaled.chain([0.0; 6]).take(count));
     }
 }
 

@@ -39,13 +39,13 @@ impl RigidMotion {
         }
     }
 
-    /// Σ factor·motion of motions of one body.
+    /// Σ multiplier·motion of motions of one body.
     pub fn combination(body: &Body, terms: impl IntoIterator<Item = (f64, Self)>) -> Self {
         let mut sum = Self::new(body, [0.0; 3]);
-        for (factor, Self { translation: [ax, ay], rotation, .. }) in terms {
-            sum.translation[0] += factor * ax;
-            sum.translation[1] += factor * ay;
-            sum.rotation += factor * rotation;
+        for (multiplier, Self { translation: [ax, ay], rotation, .. }) in terms {
+            sum.translation[0] += multiplier * ax;
+            sum.translation[1] += multiplier * ay;
+            sum.rotation += multiplier * rotation;
         }
         sum
     }

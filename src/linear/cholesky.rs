@@ -45,7 +45,7 @@ pub(super) const BYTES_PER_OPERATION: f64 = 0.8;
 const BYTES_PER_ENTRY: f64 = 200.0;
 
 impl Cholesky {
-    /// Orders and analyses `a`. The last `interface` rows are the last in the order too; [`Self::solve`] leaves them out.
+    /// Orders and analyses `a`. The last `interface` rows stay the last ones; [`Self::solve`] leaves them out.
     ///
     /// # Errors
     /// There is no memory for it.
@@ -98,7 +98,8 @@ impl Cholesky {
         residual <= LARGEST_RESIDUAL * LARGEST_RESIDUAL * load.iter().map(|b| b * b).sum::<f64>()
     }
 
-    /// Checks that there is memory for L, 32 MB of it perhaps in malloc's pool: Linux may kill for more. Collective.
+    /// Checks that there is memory for L, because Linux may kill a process that takes more. malloc's pool may hold 32 MB.
+    /// Collective.
     pub(super) fn check_memory(&self, comm: Communicator) -> Result<(), PetscError> {
         let [_, entries] = self.factor.operations_and_entries();
         let needed = 8.0 * comm.total(entries) / comm.size() as f64 - 33.6e6;
@@ -108,7 +109,7 @@ impl Cholesky {
     /// L₂₂ of a factor that has values.
     fn interface_block(&self) -> DMatrix<f64> {
         let (values, first) = (self.factor.values(), self.interior);
-        let size = self.order().len() - first;
+        let size = self.permutation().len() - first;
         let mut block = DMatrix::zeros(size, size);
         for (columns, rows, start) in self.factor.supernodes() {
             for column in columns.start.max(first)..columns.end {
@@ -128,8 +129,8 @@ impl Cholesky {
     }
 
     /// P: the row of A of each row of L.
-    pub fn order(&self) -> &[i64] {
-        self.factor.order()
+    pub fn permutation(&self) -> &[i64] {
+        self.factor.permutation()
     }
 
     /// The forward solve with L₁₁ and L₂₁, which returns y₂:
@@ -149,7 +150,7 @@ impl Cholesky {
 
     /// `x` ← A₁₁⁻¹ b₁, and 0 in the rows of the interface.
     pub fn solve(&mut self, b: &[f64], x: &mut [f64]) {
-        let interface = vec![0.0; self.order().len() - self.interior];
+        let interface = vec![0.0; self.permutation().len() - self.interior];
         self.forward(b);
         self.backward(&interface, x);
     }

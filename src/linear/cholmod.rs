@@ -22,24 +22,25 @@ impl Cholmod {
     pub(super) fn ordered(a: &mut LowerTriangle, interface: usize) -> Result<Self, PetscError> {
         let (mut this, size, mut view, none) = (Self::start(), a.size(), a.view(), ptr::null_mut());
         let common = &mut *this.common;
-        let mut order = vec![0; size];
+        let mut permutation = vec![0; size];
         let mut sets: Vec<i64> = (0..size).map(|i| i64::from(i + interface >= size)).collect();
-        let (place, sets) = (order.as_mut_ptr(), sets.as_mut_ptr());
-        // SAFETY: a live handle; the view describes arrays that live during the call, and the order
+        let (permuted, sets) = (permutation.as_mut_ptr(), sets.as_mut_ptr());
+        // SAFETY: a live handle; the view describes arrays that live during the call, and the permutation
         // and the sets have as many entries as there are rows.
-        let done = unsafe { raw::cholmod_l_camd(&mut view, none, 0, sets, place, common) != 0 };
+        let done = unsafe { raw::cholmod_l_camd(&mut view, none, 0, sets, permuted, common) != 0 };
         this.check(done)?;
-        order.retain(|&row| (row as usize) < size - interface);
-        order.extend((size - interface) as i64..size as i64);
+        permutation.retain(|&row| (row as usize) < size - interface);
+        permutation.extend((size - interface) as i64..size as i64);
         let common = &mut *this.common;
         common.nmethods = 1;
         common.method[0].ordering = raw::CHOLMOD_GIVEN as i32;
-        // SAFETY: a live handle, the view of arrays that live during the call, and an order of all rows.
-        this.factor =
-            unsafe { raw::cholmod_l_analyze_p(&mut view, order.as_mut_ptr(), none, 0, common) };
+        // SAFETY: a live handle, the view of arrays that live during the call, and a permutation of all rows.
+        this.factor = unsafe {
+            raw::cholmod_l_analyze_p(&mut view, permutation.as_mut_ptr(), none, 0, common)
+        };
         this.check(!this.factor.is_null())?;
-        if this.order().iter().copied().eq(0..size as i64) {
-            // Without an order CHOLMOD factorises the matrix as it is, not a copy.
+        if this.permutation().iter().copied().eq(0..size as i64) {
+            // With the identity CHOLMOD factorises the matrix as it is, not a copy.
             // SAFETY: an analysed factor.
             unsafe { (*this.factor).ordering = raw::CHOLMOD_NATURAL as i32 };
         }
@@ -109,7 +110,7 @@ impl Cholmod {
     }
 
     /// P: the row of A of each row of L.
-    pub(super) fn order(&self) -> &[i64] {
+    pub(super) fn permutation(&self) -> &[i64] {
         // SAFETY: the permutation of an analysed factor.
         unsafe { indices((*self.factor).Perm, (*self.factor).n) }
     }

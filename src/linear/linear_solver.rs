@@ -5,7 +5,7 @@ mod preconditioner;
 use super::{
     CondensedSystem, Factor, LinearSystem, Precision, Reduction, linear_system::TRIANGULAR_SOLVES,
 };
-use crate::petsc::{Ksp, KspProblem, Matrix, PetscError, Session, Vector};
+use crate::petsc::{Ksp, KspProblem, Matrix, PetscError, Session, Vector, stage};
 use preconditioner::TimedFactor;
 use std::mem::take;
 
@@ -159,15 +159,12 @@ impl LinearSolver {
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn condense(
-        &mut self,
-        system: LinearSystem,
-    ) -> Result<Option<CondensedSystem<'_>>, PetscError> {
+    pub fn condense(&mut self) -> Result<Option<CondensedSystem<'_>>, PetscError> {
         if !self.factor.exists() {
             return Ok(None);
         }
         let Self { factor, residual, .. } = self;
-        system.timed(TRIANGULAR_SOLVES, 0.5, || factor.condense(residual)).map(Some)
+        stage(TRIANGULAR_SOLVES, || factor.condense(residual)).map(Some)
     }
 
     /// Back substitution: `x` ← `x` + d from the last solution for the condensed unknowns. If no prescribed
@@ -181,7 +178,7 @@ impl LinearSolver {
         moved: bool,
         x: &mut Vector,
     ) -> Result<(), PetscError> {
-        system.timed(TRIANGULAR_SOLVES, 0.5, || self.factor.expand(&mut self.expanded))?;
+        stage(TRIANGULAR_SOLVES, || self.factor.expand(&mut self.expanded))?;
         self.prepared = !moved;
         if moved {
             self.iterations += 1;
@@ -252,7 +249,7 @@ impl LinearSolver {
         let problem = KspProblem { matrix, prescribed: system.prescribed, limit, most };
         let first = is_prepared.then_some(&self.expanded);
         let of = self.modified.is_some().then_some(b);
-        let mut own = TimedFactor { factor: &mut self.factor, first, of, system };
+        let mut own = TimedFactor { factor: &mut self.factor, first, of };
         let solved = self.ksp.solve(&problem, &mut own, b, &mut self.correction)?;
         self.norm = solved.norm;
         if self.modified.is_some() {

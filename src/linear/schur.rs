@@ -131,11 +131,11 @@ impl SchurComplement {
 /// ([`Factor`](super::Factor)). With e = E^½, x = e x₀ and p = p₀/e for the unknowns x₀ and forces p₀ of A₀.
 pub struct CondensedSystem<'a> {
     pub(super) schur: &'a mut SchurComplement,
-    /// The places of this rank's condensed unknowns.
+    /// The positions of this rank's condensed unknowns.
     pub(super) own: Vec<usize>,
     /// e of this rank's condensed unknowns.
     pub(super) scaling: Vec<f64>,
-    /// b₀ and x₀ of all places.
+    /// b₀ and x₀ of all positions.
     pub(super) b: &'a [f64],
     pub(super) x: &'a mut [f64],
 }
@@ -161,9 +161,9 @@ impl CondensedSystem<'_> {
         schur.comm.sum(x);
         let mut forces = b.to_vec();
         schur.solve_prescribed(&mut forces, x);
-        let places = || own.iter().zip(&*scaling);
-        let unknowns = places().map(|(&i, e)| e * x[i]).collect();
-        Ok(Some([unknowns, places().map(|(&i, e)| forces[i] / e).collect()]))
+        let positions = || own.iter().zip(&*scaling);
+        let unknowns = positions().map(|(&i, e)| e * x[i]).collect();
+        Ok(Some([unknowns, positions().map(|(&i, e)| forces[i] / e).collect()]))
     }
 
     /// The condensed unknowns of this rank without prescribed ones: (S + D) x = b − p, with a diagonal D

@@ -34,15 +34,15 @@ pub(super) struct Substructure {
     local: Cholesky,
     /// S.
     schur: SchurComplement,
-    /// b and x of a solve, by places.
+    /// b and x of a solve, by positions.
     vectors: [Vec<f64>; 2],
 }
 
-/// The unknowns of a rank. Their *places* are those of a vector of three parts: the interior of the
+/// The unknowns of a rank. Their *positions* are those of a vector of three parts: the interior of the
 /// rank, the interface next to it, the interface of all ranks.
 struct RankDivision {
-    /// Per owned unknown: its place, in the first or the third part.
-    places: Vec<usize>,
+    /// Per owned unknown: its position, in the first or the third part.
+    positions: Vec<usize>,
     /// Global indices of all ranks' unknowns of Γ, increasing.
     interface: Vec<i32>,
     /// Indices in `interface` of the neighbours of this rank's interior, increasing.
@@ -81,7 +81,7 @@ impl Substructure {
         let local = Cholesky::analyse(&mut a, near, precision)?;
         local.check_memory(comm)?;
         let last = interior as i64..(interior + near) as i64;
-        let in_place = local.order()[interior..].iter().copied().eq(last);
+        let in_place = local.permutation()[interior..].iter().copied().eq(last);
         let schur = SchurComplement::new(comm);
         let length = interior + near + division.interface.len();
         let vectors = [vec![0.0; length], vec![0.0; length]];
@@ -134,9 +134,9 @@ impl Substructure {
     /// Prescribes some of the condensed unknowns. It returns false if the rest of the matrix is not positive
     /// definite. Collective.
     pub(super) fn prescribe(&mut self, prescribed: &[usize]) -> Result<bool, PetscError> {
-        let (places, shared) = (&self.division.places, self.division.shared());
-        let place = |&i: &usize| places[i] - shared;
-        self.schur.prescribe(prescribed.iter().map(place), iter::empty())
+        let (positions, shared) = (&self.division.positions, self.division.shared());
+        let position = |&i: &usize| positions[i] - shared;
+        self.schur.prescribe(prescribed.iter().map(position), iter::empty())
     }
 
     /// `z` ← A⁻¹ `r` on the owned unknowns, 0 on prescribed ones. Collective.
@@ -154,10 +154,10 @@ impl Substructure {
     /// Eliminates the interior from A x = `r`. Collective.
     fn eliminate(&mut self, r: &[f64]) {
         let shared = self.division.shared();
-        let RankDivision { places, near, .. } = &self.division;
+        let RankDivision { positions, near, .. } = &self.division;
         let [b, _] = &mut self.vectors;
         b[shared..].fill(0.0);
-        places.iter().zip(r).for_each(|(&place, r)| b[place] = *r);
+        positions.iter().zip(r).for_each(|(&position, r)| b[position] = *r);
         let (b_local, b_shared) = b.split_at_mut(shared);
         // − A_ΓI A_II⁻¹ r_I
         let values = self.local.forward(b_local);
@@ -176,23 +176,23 @@ impl Substructure {
         self.eliminate(r);
         let Self { division, schur, vectors: [b, x], .. } = self;
         let shared = division.shared();
-        let own = condensed.iter().map(|&i| division.places[i] - shared).collect();
+        let own = condensed.iter().map(|&i| division.positions[i] - shared).collect();
         CondensedSystem { schur, own, scaling, b: &b[shared..], x: &mut x[shared..] }
     }
 
     /// `z` ← the solution for the last x of the interface. Collective.
     pub(super) fn expand(&mut self, z: &mut [f64]) {
         let Self { division, local, vectors, .. } = self;
-        let RankDivision { places, near, .. } = &*division;
+        let RankDivision { positions, near, .. } = &*division;
         let (x_local, x_shared) = vectors[1].split_at_mut(division.shared());
         let interface: Vec<f64> = near.iter().map(|&i| x_shared[i]).collect();
         local.backward(&interface, x_local);
-        places.iter().zip(z).for_each(|(&place, z)| *z = vectors[1][place]);
+        positions.iter().zip(z).for_each(|(&position, z)| *z = vectors[1][position]);
     }
 }
 
 impl RankDivision {
-    /// Where the third part of the places begins.
+    /// Where the third part of the positions begins.
     fn shared(&self) -> usize {
         self.interior + self.near.len()
     }
@@ -227,13 +227,13 @@ impl RankDivision {
         near.sort_unstable();
         near.dedup();
         let interior = inner.len();
-        let mut places = vec![0; rows.len()];
+        let mut positions = vec![0; rows.len()];
         let owned = |row: i32| (row - rows.start) as usize;
-        inner.into_iter().enumerate().for_each(|(place, row)| places[owned(row)] = place);
+        inner.into_iter().enumerate().for_each(|(position, row)| positions[owned(row)] = position);
         for (i, &row) in interface.iter().enumerate().filter(|(_, row)| rows.contains(row)) {
-            places[owned(row)] = interior + near.len() + i;
+            positions[owned(row)] = interior + near.len() + i;
         }
-        Ok(Some(Self { places, interface, near, interior }))
+        Ok(Some(Self { positions, interface, near, interior }))
     }
 
     /// Reads the rows that this rank owns.
@@ -242,20 +242,20 @@ impl RankDivision {
         let (mut local, mut largest_row_sum) = (LowerTriangle::default(), 0.0_f64);
         let mut interface = DMatrix::zeros(self.interface.len(), self.interface.len());
         let rows = matrix.rows();
-        for (row, &place) in rows.clone().zip(&self.places) {
+        for (row, &position) in rows.clone().zip(&self.positions) {
             matrix.read_row(row, |columns, values| {
                 let mut row_sum = 0.0;
                 for (&column, &value) in columns.iter().zip(values) {
-                    match self.place(rows.start, column) {
+                    match self.position(rows.start, column) {
                         // The transpose of an entry of `local`.
-                        Some(other) if other < interior && other < place => {}
+                        Some(other) if other < interior && other < position => {}
                         Some(other) if other < interior => local.push(other, value),
-                        Some(other) if place < interior => {
+                        Some(other) if position < interior => {
                             let near = self.near.binary_search(&(other - shared));
                             near.iter().for_each(|near| local.push(interior + near, value));
                         }
                         Some(other) => {
-                            interface[(place - shared, other - shared)] = value;
+                            interface[(position - shared, other - shared)] = value;
                             row_sum += value.abs();
                         }
                         None => {}
@@ -263,16 +263,16 @@ impl RankDivision {
                 }
                 largest_row_sum = largest_row_sum.max(row_sum);
             })?;
-            if place < interior {
+            if position < interior {
                 local.end_column();
             }
         }
         Ok(Blocks { local, interface, largest_row_sum })
     }
 
-    /// The place of an unknown with this global index; `None` in the interior of another rank.
-    fn place(&self, first: i32, unknown: i32) -> Option<usize> {
-        let owned = usize::try_from(unknown - first).ok().and_then(|i| self.places.get(i));
+    /// The position of an unknown with this global index; `None` in the interior of another rank.
+    fn position(&self, first: i32, unknown: i32) -> Option<usize> {
+        let owned = usize::try_from(unknown - first).ok().and_then(|i| self.positions.get(i));
         let shared = self.shared();
         let on_interface = || Some(shared + self.interface.binary_search(&unknown).ok()?);
         owned.copied().or_else(on_interface)

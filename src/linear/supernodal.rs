@@ -65,8 +65,8 @@ impl Supernode {
         (0..self.panels()).map(|panel| self.front_height() - Self::first_tile(panel)).sum()
     }
 
-    /// The place in the front of a row of the supernode.
-    fn place(&self, row: usize) -> usize {
+    /// The position in the front of a row of the supernode.
+    fn position(&self, row: usize) -> usize {
         if row < self.columns { row } else { row - self.columns + PANEL_WIDTH * self.panels() }
     }
 }
@@ -74,7 +74,7 @@ impl Supernode {
 /// L₁₁ and L₂₁ with entries `T`, in the order in which they are read.
 pub(super) struct Supernodal<T> {
     /// P: the row of A of each row of L.
-    order: Vec<u32>,
+    permutation: Vec<u32>,
     supernodes: Vec<Supernode>,
     /// Per supernode: the rows below its diagonal block.
     rows: Vec<u32>,
@@ -103,10 +103,10 @@ impl<T: Number> Supernodal<T> {
         let panels = supernodes.iter().map(Supernode::panels).sum();
         let front = supernodes.iter().map(Supernode::front_height).max().unwrap_or(0);
         Self {
-            order: factor.order().iter().map(|&row| row as u32).collect(),
+            permutation: factor.permutation().iter().map(|&row| row as u32).collect(),
             diagonal: vec![DiagonalBlock::identity(); panels],
             tiles: Vec::new(),
-            y: vec![T::zero(); factor.order().len()],
+            y: vec![T::zero(); factor.permutation().len()],
             scale: 0.0,
             front: vec![[T::zero(); TILE_HEIGHT]; front],
             supernodes,
@@ -200,7 +200,8 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
                     let column = &values[j * height..(j + 1) * height];
                     panel.set_column(j % PANEL_WIDTH, &column[j..end]);
                     for (i, &value) in column.iter().enumerate().skip(end) {
-                        let (tile, row) = (s.place(i) / TILE_HEIGHT, s.place(i) % TILE_HEIGHT);
+                        let (tile, row) =
+                            (s.position(i) / TILE_HEIGHT, s.position(i) % TILE_HEIGHT);
                         below[tile - first_tile][j % PANEL_WIDTH][row] = convert(value);
                     }
                 }
@@ -211,7 +212,7 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
 
     fn forward(&mut self, b: &[f64]) -> Vec<f64> {
         self.scale = b.iter().fold(f64::MIN_POSITIVE, |scale, b| scale.max(b.abs()));
-        for (y, &row) in self.y.iter_mut().zip(&self.order) {
+        for (y, &row) in self.y.iter_mut().zip(&self.permutation) {
             *y = convert(b[row as usize] / self.scale);
         }
         self.solve_forward();
@@ -230,7 +231,7 @@ impl<T: Number> TriangularSolver for Supernodal<T> {
         }
         outer.iter_mut().zip(interface).for_each(|(y, value)| *y = convert(value / scale));
         self.solve_backward();
-        for (&y, &row) in self.y.iter().zip(&self.order) {
+        for (&y, &row) in self.y.iter().zip(&self.permutation) {
             x[row as usize] = self.scale * convert_unchecked::<T, f64>(y);
         }
     }

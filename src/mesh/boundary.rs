@@ -22,7 +22,8 @@ impl BoundaryFace {
         Self { normal, of_line: normal, length }
     }
 
-    /// Whether the other face continues this one smoothly. Faces with the same normal do, whatever they approximate.
+    /// Does the other face continue this one smoothly: are the normals of the approximated boundaries parallel, or those of the
+    /// faces?
     pub fn continues(&self, other: &Self) -> bool {
         angle(self.of_line, other.of_line).min(self.angle(other)) <= SAME_DIRECTION
     }

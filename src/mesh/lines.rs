@@ -74,7 +74,8 @@ impl<'a> Lines<'a> {
             return true;
         }
         let [(a, of_a), (b, of_b)] = [p, q].map(|end| self.estimate(node, end));
-        // A corner nearby spoils the tangent of its side. The one of the other side belongs to the circle through p and q.
+        // Without the points of a geometry, a corner of the line next to p, or next to q, spoils the tangent on that side. The
+        // line is then smooth at the node if the tangent of the other side is that of the circle through p, the node and q.
         let middle = self.circle(node, [p, q].map(|end| self.point(end)));
         let follows = turn(a, -middle) - of_a <= 0.5 * self.largest_kink
             || turn(b, middle) - of_b <= 0.5 * self.largest_kink;

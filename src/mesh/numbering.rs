@@ -1,4 +1,4 @@
-//! The order of nodes and triangles.
+//! The numbering of nodes and triangles.
 
 use super::{Mesh, bounds, extent, sorted};
 
@@ -47,9 +47,9 @@ fn spread(number: u32) -> u64 {
     (0..32).fold(0, |bits, i| bits | u64::from(number >> i & 1) << (2 * i))
 }
 
-/// The place of each number in a permutation.
+/// The position of each number in a permutation.
 fn inverse(permutation: &[usize]) -> Vec<usize> {
-    let mut places = vec![0; permutation.len()];
-    permutation.iter().enumerate().for_each(|(place, &number)| places[number] = place);
-    places
+    let mut positions = vec![0; permutation.len()];
+    permutation.iter().enumerate().for_each(|(position, &number)| positions[number] = position);
+    positions
 }

@@ -1,9 +1,6 @@
 //! The common output of all commands at the terminal.
 
-pub use comfy_table::presets::ASCII_MARKDOWN as MARKDOWN;
-
 use crate::printable::{print_error, printable};
-use comfy_table::{CellAlignment, Table, TableStyle};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
     io::{self, Write},
@@ -123,24 +120,4 @@ pub fn fitting(fields: &[String], columns: usize) -> String {
     let lengths = (0..fields.len()).map(|i| fields[..=i].join("  ").chars().count());
     let count = lengths.take_while(|length| *length <= columns).count();
     fields[..count.max(1).min(fields.len())].join("  ")
-}
-
-/// A table of `rows`. Each cell comes with the title of its column. Numbers are aligned to the right in all
-/// columns except the first `names`.
-pub fn table<T: ToString, R: IntoIterator<Item = (T, String)>>(
-    style: TableStyle,
-    rows: impl IntoIterator<Item = R>,
-    names: usize,
-) -> String {
-    let mut table = Table::new();
-    table.load_style(style);
-    for row in rows {
-        let (titles, cells): (Vec<T>, Vec<String>) = row.into_iter().unzip();
-        table.set_header(titles);
-        table.add_row(cells);
-    }
-    for column in table.column_iter_mut().skip(names) {
-        column.set_cell_alignment(CellAlignment::Right);
-    }
-    table.to_string()
 }

@@ -23,6 +23,7 @@ mod ksp;
 mod matrix;
 mod options;
 mod session;
+mod stage;
 mod tao;
 mod vector;
 
@@ -36,6 +37,7 @@ pub use communicator::Communicator;
 pub use error::PetscError;
 pub use matrix::{Matrix, Pattern};
 pub use session::{Session, version};
+pub use stage::{stage, stage_seconds};
 pub use vector::Vector;
 
 pub(crate) use ghosts::Ghosts;

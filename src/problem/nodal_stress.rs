@@ -35,7 +35,7 @@ pub(crate) struct Point {
     pub(crate) ends: [usize; 2],
 }
 
-/// What the stresses of a state are made from.
+/// The strains and ζ from which the stresses of a state are computed.
 pub struct Strained {
     /// ε(u) at the quadrature points.
     pub(crate) strains: Vec<Vector3<f64>>,
@@ -86,7 +86,7 @@ impl NodalStress {
         self.points.iter().map(|point| point.at).collect()
     }
 
-    /// What the stresses of `state` are made from.
+    /// The strains and ζ of `state`, from which its stresses are computed.
     pub fn strained(problem: &DiscreteProblem, state: &State) -> Strained {
         let (strains, zeta) = (problem.body.strains(&state.u), state.zeta.clone());
         Strained { strains, zeta, threshold: problem.threshold() }

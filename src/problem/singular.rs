@@ -26,9 +26,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 pub struct Singular {
     /// The point, m.
     pub at: [f64; 2],
-    /// Stresses nearer than this are large because of it: the length of the longest edge there, m.
+    /// The distance within which the point makes stresses large, m: the length of the longest edge at the point.
     pub radius: f64,
-    /// What it is, as in "the end of `clamp`".
+    /// The kind of the point, as in "the end of `clamp`".
     pub name: String,
     /// Is it singular only while contact is open there?
     pub is_open: bool,
@@ -214,7 +214,8 @@ impl DiscreteProblem {
         if is_same && ends.len() == 2 {
             return None;
         }
-        // Contact on both sides of the end of an interface is closed on both, or open.
+        // A contact condition is closed or open. Where one smooth foundation passes the end of an interface of two materials,
+        // it is closed on both sides of the end, or open on both.
         let cases = (0..of_a.len()).flat_map(|i| (0..of_b.len()).map(move |k| [i, k]));
         let mut cases = cases.filter(|[i, k]| !is_same || i == k);
         let case = cases
@@ -246,15 +247,15 @@ impl DiscreteProblem {
         })
     }
 
-    /// The supported edges of the boundary, each with its support of the highest rank.
+    /// The supported edges of the boundary, each with the support that prescribes most components.
     fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
         let mut supports = BTreeMap::new();
         for boundary in &self.scene().boundaries {
             for edge in self.mesh().edges_of(&boundary.name) {
                 for condition in &boundary.conditions {
-                    let (new, rank) = ((condition, boundary), |of| conditions(Some(of), 0.0).0);
+                    let (new, count) = ((condition, boundary), |of| conditions(Some(of), 0.0).0);
                     let known = supports.entry(*edge).or_insert(new);
-                    *known = if rank(&new) > rank(known) { new } else { *known };
+                    *known = if count(&new) > count(known) { new } else { *known };
                 }
             }
         }

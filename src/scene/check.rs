@@ -158,7 +158,8 @@ impl Scene {
         let mut taken = BTreeMap::new();
         for name in self.surfaces.keys() {
             let keys = ["material", "damage"].map(|table| format!("{table}.{name}"));
-            let key = keys.iter().find(|key| self.text.place(key) != NOWHERE).unwrap_or(&keys[0]);
+            let key =
+                keys.iter().find(|key| self.text.position(key) != NOWHERE).unwrap_or(&keys[0]);
             let Some(triangles) = mesh.surfaces.get(name) else {
                 let known: Vec<&str> = mesh.surfaces.keys().map(String::as_str).collect();
                 let suggestion = suggestion(name, &known);
@@ -253,13 +254,13 @@ impl Scene {
     }
 
     pub(super) fn at_key(&self, key: &str, problem: &str) -> Problem {
-        (self.text.place(key), format!("{key} {problem}"))
+        (self.text.position(key), format!("{key} {problem}"))
     }
 
     /// A problem of a boundary, placed at its name.
     fn at_name(&self, Boundary { name, .. }: &Boundary, problem: &str) -> Problem {
-        let place = self.text.place(&boundary_key(name, "name"));
-        (place, format!("boundary \"{name}\" {problem}"))
+        let position = self.text.position(&boundary_key(name, "name"));
+        (position, format!("boundary \"{name}\" {problem}"))
     }
 }
 

@@ -1,4 +1,4 @@
-//! The TOML document of a scene: the file with the `--set` arguments inserted. Every value knows the place
+//! The TOML document of a scene: the file with the `--set` arguments inserted. Every value knows the position
 //! where it is written.
 
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ const LISTS: [&str; 2] = ["boundary", "probe"];
 /// The largest number of problems that are reported at once.
 const MOST_SHOWN: usize = 20;
 
-/// The place of a problem and the message.
+/// The position of a problem and the message.
 pub(super) type Problem = (Range<usize>, String);
 
 /// The full key of `name` in the table at `key`; of the table itself if `name` is "".
@@ -37,10 +37,10 @@ pub(super) fn below(key: &str, name: &str) -> String {
     }
 }
 
-/// The place of a problem that concerns the whole file.
+/// The position of a problem that concerns the whole file.
 pub(super) const NOWHERE: Range<usize> = Range { start: 1, end: 0 };
 
-/// The text of a scene. A place in it is a range of bytes. The bytes of the file are counted from 0, the
+/// The text of a scene. A position in it is a range of bytes. The bytes of the file are counted from 0, the
 /// bytes of the n-th `--set` argument from n times the `stride`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SceneText {
@@ -49,12 +49,12 @@ pub(super) struct SceneText {
     file: String,
     /// The `--set` arguments.
     sets: Vec<String>,
-    /// The `--set` arguments as TOML, indented to their places.
+    /// The `--set` arguments as TOML, indented to their positions.
     arguments: Vec<String>,
     /// A number of bytes larger than the length of the file and of each argument.
     stride: usize,
-    /// The places of the values that have been read, by their full keys.
-    pub(super) places: BTreeMap<String, Range<usize>>,
+    /// The positions of the values that have been read, by their full keys.
+    pub(super) positions: BTreeMap<String, Range<usize>>,
     /// The values as written, from [`Self::values`].
     pub(super) document: toml::Table,
 }
@@ -95,26 +95,26 @@ impl SceneText {
 
     /// An error that lists the `problems` in the order of the file, if there are any.
     pub(super) fn refuse(&self, mut problems: Vec<Problem>) -> Result<(), SceneError> {
-        problems.sort_by_key(|(place, _)| (place.start, place.end));
+        problems.sort_by_key(|(position, _)| (position.start, position.end));
         problems.truncate(MOST_SHOWN);
-        let report = |(place, message): &Problem| self.report(place, message);
+        let report = |(position, message): &Problem| self.report(position, message);
         let mut reports: Vec<String> = problems.iter().map(report).collect();
         let Some(last) = reports.last_mut() else { return Ok(()) };
         // A line of the file may contradict an argument of the command line.
-        let of_the_file = |(place, _): &Problem| place.start < self.stride;
+        let of_the_file = |(position, _): &Problem| position.start < self.stride;
         if !self.sets.is_empty() && problems.iter().all(of_the_file) {
             *last += &format!("\n(the file was read with --set {})", self.sets.join(" --set "));
         }
         Err(SceneError(reports))
     }
 
-    /// The message after its place, and below it the underlined lines of the file.
-    fn report(&self, place: &Range<usize>, message: &str) -> String {
-        let problem = format!("{}: {message}", self.in_words(place));
-        if *place == NOWHERE || place.start >= self.stride {
+    /// The message after its position, and below it the underlined lines of the file.
+    fn report(&self, position: &Range<usize>, message: &str) -> String {
+        let problem = format!("{}: {message}", self.in_words(position));
+        if *position == NOWHERE || position.start >= self.stride {
             return problem;
         }
-        let value = AnnotationKind::Primary.span(place.clone());
+        let value = AnnotationKind::Primary.span(position.clone());
         let lines = Snippet::source(self.file.as_str()).annotation(value);
         let lines = Renderer::plain().render(&[Group::with_level(Level::ERROR).element(lines)]);
         format!("{problem}\n{lines}")
@@ -126,18 +126,18 @@ impl SceneText {
     }
 
     /// The file and the line, or the file and the `--set` argument.
-    pub(super) fn in_words(&self, place: &Range<usize>) -> String {
+    pub(super) fn in_words(&self, position: &Range<usize>) -> String {
         let path = self.path.display();
-        match place.start / self.stride {
-            _ if *place == NOWHERE => path.to_string(),
-            0 => format!("{path}:{}", self.line(place.start)),
+        match position.start / self.stride {
+            _ if *position == NOWHERE => path.to_string(),
+            0 => format!("{path}:{}", self.line(position.start)),
             set => format!("{path}, --set {}", self.sets[set - 1]),
         }
     }
 
-    /// The place of the value of a key.
-    pub(super) fn place(&self, key: &str) -> Range<usize> {
-        self.places.get(key).cloned().unwrap_or(NOWHERE)
+    /// The position of the value of a key.
+    pub(super) fn position(&self, key: &str) -> Range<usize> {
+        self.positions.get(key).cloned().unwrap_or(NOWHERE)
     }
 
     /// The values of a document. They are empty if a number does not fit its type.
@@ -146,9 +146,9 @@ impl SceneText {
         toml::Table::deserialize(root).unwrap_or_default()
     }
 
-    /// The problem of a key at `place` that the file has above already, perhaps in another form.
-    fn given_twice(&self, place: &Range<usize>) -> String {
-        let key = self.file.get(place.clone()).unwrap_or_default();
+    /// The problem of a key at `position` that the file has above already, perhaps in another form.
+    fn given_twice(&self, position: &Range<usize>) -> String {
+        let key = self.file.get(position.clone()).unwrap_or_default();
         match LISTS.contains(&key) {
             true => format!("{key} is a list, each begins with [[{key}]]"),
             false => format!(
@@ -164,22 +164,22 @@ impl SceneText {
             error.message() == "duplicate key" || error.message().starts_with("cannot extend value")
         };
         let syntax = |error: &toml::de::Error| {
-            let place = error.span().unwrap_or(NOWHERE);
+            let position = error.span().unwrap_or(NOWHERE);
             let problem = match is_duplicate(error) {
-                true => self.given_twice(&place),
+                true => self.given_twice(&position),
                 false => format!(
                     "not valid TOML: {}; write numbers as 0.5, and expressions and texts in quotes",
                     error.message()
                 ),
             };
-            (place, problem)
+            (position, problem)
         };
         // After an unclosed table, keys seem to be duplicates.
         let all = errors.first().is_none_or(is_duplicate);
         let reported = errors.iter().filter(|error| all || !is_duplicate(error));
         let mut problems: Vec<Problem> = reported.map(syntax).collect();
         // Further errors in a line follow from the first one.
-        problems.dedup_by_key(|(place, _)| self.line(place.start));
+        problems.dedup_by_key(|(position, _)| self.line(position.start));
         self.refuse(problems)?;
         let mut root = DeValue::Table(root.into_inner());
         let mut problems = Vec::new();
@@ -210,7 +210,7 @@ impl SceneText {
     ) -> Result<(), String> {
         for (name, value) in given {
             let key = below(key, name.get_ref());
-            let place = value.span();
+            let position = value.span();
             let there = match old {
                 DeValue::Table(table) => table.get_mut(&name),
                 DeValue::Array(tables) => {
@@ -218,7 +218,7 @@ impl SceneText {
                 }
                 _ => None,
             };
-            let is_braced = argument[place.start..].starts_with('{');
+            let is_braced = argument[position.start..].starts_with('{');
             let earlier = there.as_deref().map_or(0, last_place) / self.stride;
             match (there.map(Spanned::get_mut), value.into_inner()) {
                 (Some(there @ (DeValue::Table(_) | DeValue::Array(_))), DeValue::Table(given))
@@ -242,9 +242,9 @@ impl SceneText {
                         return Err(format!("{key}: the file has no such constant{suggestion}"));
                     }
                     (_, DeValue::Table(table)) => {
-                        // The old key has the place of the old value.
+                        // The old key takes the position of the old value.
                         table.remove(&name);
-                        table.insert(name, Spanned::new(place, value));
+                        table.insert(name, Spanned::new(position, value));
                     }
                     (false, DeValue::Array(tables)) => {
                         let names = tables.iter().filter_map(|table| name_of(table.get_ref()));
@@ -259,7 +259,7 @@ impl SceneText {
     }
 }
 
-/// The last place of a value and of the values in it.
+/// The last position of a value and of the values in it.
 fn last_place(value: &Spanned<DeValue>) -> usize {
     let inner = match value.get_ref() {
         DeValue::Table(table) => table.values().map(last_place).max(),

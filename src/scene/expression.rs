@@ -19,7 +19,7 @@ use toml::Value;
 
 pub(super) use parser::{WITHOUT_VALUE, refused_name};
 
-/// The problem of an expression in the place of a number.
+/// The message if an expression of x, y or t stands for a number.
 pub(super) const NOT_CONSTANT: &str = "must be a constant, without x, y and t";
 /// The largest allowed length of an expression, bytes. A run evaluates it at many points and times.
 const MAX_LENGTH: usize = 20_000;
@@ -60,7 +60,7 @@ pub struct Expression {
     height: usize,
 }
 
-/// What the names in an expression refer to.
+/// The variables, constants and functions that the names in an expression refer to.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scope {
     /// The folder to which paths of tables are relative.

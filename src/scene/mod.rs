@@ -235,9 +235,9 @@ impl Scene {
         let document = SceneText::values(&root);
         let mut found = Diagnostics::check(&text, &root, &document);
         let scene = tables::scene(&mut found);
-        let Diagnostics { problems, places, .. } = found;
+        let Diagnostics { problems, positions, .. } = found;
         text.refuse(problems)?;
-        (text.places, text.document) = (places, document);
+        (text.positions, text.document) = (positions, document);
         // Without problems there is a scene.
         let scene = scene.ok_or_else(|| SceneError(Vec::new()))?;
         Ok(Self { text, ..scene })

@@ -67,20 +67,20 @@ pub(super) struct Diagnostics<'t> {
     /// The values, completed by defaults.
     document: Value,
     pub(super) problems: Vec<Problem>,
-    /// The places of the values, by their full keys.
-    pub(super) places: BTreeMap<String, Range<usize>>,
+    /// The positions of the values, by their full keys.
+    pub(super) positions: BTreeMap<String, Range<usize>>,
     /// The keys of values with problems.
     unsound: BTreeSet<String>,
 }
 
 impl<'t> Diagnostics<'t> {
-    /// Reads the document of `text`: `root` has the places, `document` the values.
+    /// Reads the document of `text`: `root` has the positions, `document` the values.
     pub(super) fn check(text: &'t SceneText, root: &DeValue, document: &toml::Table) -> Self {
         let constants = document.get("constants").and_then(Value::as_table).cloned();
         let scope = Scope::new(text.folder(), constants.unwrap_or_default());
-        let (problems, places, unsound) = Default::default();
+        let (problems, positions, unsound) = Default::default();
         let document = Value::Boolean(false);
-        let mut found = Self { text, scope, document, problems, places, unsound };
+        let mut found = Self { text, scope, document, problems, positions, unsound };
         found.document = found.read(String::new(), root, &ROOT);
         // What only follows from a wrong constant is left out.
         let follows = |problem: &str| problem.contains(WITHOUT_VALUE);
@@ -93,9 +93,9 @@ impl<'t> Diagnostics<'t> {
         self.note_at(key, format!("{key} {problem}"));
     }
 
-    /// Adds a problem at the place of a key.
+    /// Adds a problem at the position of a key.
     fn note_at(&mut self, key: &str, problem: String) {
-        self.problems.push((self.places.get(key).cloned().unwrap_or(NOWHERE), problem));
+        self.problems.push((self.positions.get(key).cloned().unwrap_or(NOWHERE), problem));
     }
 
     /// Checks a value against its schema and returns what it means: a number for an expression of constants, and
@@ -131,14 +131,14 @@ impl<'t> Diagnostics<'t> {
     fn read_table(&mut self, key: &str, table: &DeTable, schema: &Schema) -> Value {
         let (mut is_misspelt, mut read) = (false, toml::Table::new());
         for (name, value) in table {
-            // The place of a table is its header.
+            // The position of a table is its header.
             let span = value.span();
             let start = if value.get_ref().is_table() { span.start } else { name.span().start };
-            let (name, place, value) = (name.get_ref(), start..span.end, value.get_ref());
+            let (name, position, value) = (name.get_ref(), start..span.end, value.get_ref());
             let refused = refused_name(name).filter(|_| key == "constants");
             let key = below(key, name);
             if let Some(problem) = refused {
-                self.problems.push((place.clone(), format!("{key} {problem}")));
+                self.problems.push((position.clone(), format!("{key} {problem}")));
             }
             // The keys of this table are names of the user.
             let named = &schema["additionalProperties"];
@@ -146,18 +146,18 @@ impl<'t> Diagnostics<'t> {
             let schema = match schema["properties"].get(&**name) {
                 Some(_) if is_named => {
                     let problem = "has the name of a key; give the physical surface another name";
-                    self.problems.push((place, format!("{key} {problem}")));
+                    self.problems.push((position, format!("{key} {problem}")));
                     continue;
                 }
                 None if !is_named => {
                     let suggestion = known_as(schema, name, value, &self.scope.constants);
                     is_misspelt |= suggestion.contains("did you mean");
-                    self.problems.push((place, format!("unknown key {key}{suggestion}")));
+                    self.problems.push((position, format!("unknown key {key}{suggestion}")));
                     continue;
                 }
                 schema => schema.unwrap_or(named),
             };
-            self.places.insert(key.clone(), place);
+            self.positions.insert(key.clone(), position);
             read.insert(name.to_string(), self.read(key, value, schema));
         }
         for (name, schema) in schema["properties"].as_object().into_iter().flatten() {
@@ -190,7 +190,7 @@ impl<'t> Diagnostics<'t> {
         let (mut seen, mut read) = (BTreeMap::new(), Vec::new());
         for (i, value) in array.iter().enumerate() {
             let element = key_of_element(key, i, name_of(value.get_ref()));
-            self.places.insert(element.clone(), value.span());
+            self.positions.insert(element.clone(), value.span());
             read.push(self.read(element.clone(), value.get_ref(), &schema["items"]));
             if let Some(first) = seen.insert(element.clone(), value.span()) {
                 let first = self.text.in_words(&first);

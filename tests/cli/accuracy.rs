@@ -561,7 +561,7 @@ fn after_a_stop_the_errors_are_those_of_its_time_alone() {
         for more in [&["damage.lambda_u=20000"][..], &["damage.lambda_u=5000", "damage.lambda_d=0"]]
         {
             let options = sets(&[steps, more].concat());
-            let said = directory.run(&[&options[..], &["--profile"]].concat());
+            let said = directory.run(&options);
             let summary = directory.summary("out/scene");
             assert!(summary["stopped_uncertainty"].as_f64() > Some(0.0), "{}", said.out);
             for error in ["damage_mesh", "damage_steps", "displacement_steps"] {

@@ -1,4 +1,4 @@
-//! What pages tell about the code is so: the register of tuned constants, and the order of the rooms.
+//! Pages about the code are right: the register of tuned constants, the order of the rooms, names of files and functions.
 
 use std::{env, fs, path::Path, process::Command};
 
@@ -15,7 +15,7 @@ fn the_register_of_tuned_constants_is_made_of_their_comments_and_each_name_means
 }
 
 #[test]
-fn a_room_uses_only_rooms_before_it() {
+fn a_room_uses_only_rooms_before_it_and_the_names_in_pages_about_the_code_exist() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let picture = tempfile::NamedTempFile::with_suffix(".svg").expect("a file");
     let drawn = Command::new(env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned()))

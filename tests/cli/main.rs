@@ -14,7 +14,7 @@ mod export;
 mod extremes;
 mod failing;
 mod fields;
-mod figures;
+mod plot;
 mod losses;
 mod kept;
 mod krylov;

@@ -38,7 +38,7 @@ fn paths_that_are_not_utf_8() {
     let run = [after("run", &scene, &["--out"]), vec![out.clone(), "--mesh".into(), mesh]].concat();
     let python = ["info", "table"].map(|name| after(name, &out, &[]));
     let figures = [&["--along", "top"][..], &["--together"]];
-    let figures = figures.map(|arguments| after("figures", &out, arguments));
+    let figures = figures.map(|arguments| after("plot", &out, arguments));
     let study = after("study", &scene, &["--set", "time.end=0.5,1"]);
     let again = vec![
         "run".into(),
@@ -86,7 +86,7 @@ fn names_of_boundaries_with_signs() {
     };
     assert!(said.code == Some(0) && said.out.contains("a,b.force_y"), "{said:?}");
     for (_, name) in sides {
-        let along = ["figures", "out/scene", "--along", name, "--format", "svg"];
+        let along = ["plot", "out/scene", "--along", name, "--format", "svg"];
         let said = directory.say(&along);
         assert_eq!(said.code, Some(0), "{said:?}");
         assert_eq!(said.out.lines().count(), 2, "{said:?}");

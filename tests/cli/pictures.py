@@ -8,7 +8,7 @@ import drawing
 import report
 import report_pdf
 from contact_pressure import draw_evolution
-from figures import FIGURES
+from plot import PICTURES
 from histories import draw_histories
 from limits import limits_of
 from maps import draw_state
@@ -48,7 +48,7 @@ for folder in map(Path, sys.argv[1:]):
     limits = limits_of(everything)
     for width in (None, 3.5):
         drawing.use(width=width)
-        for name, draw_one in FIGURES.items():
+        for name, draw_one in PICTURES.items():
             check(f"{folder} {name} {width}", draw_one(results, limits), width)
         check(f"{folder} state {width}", draw_state(results, limits), width)
         check(f"{folder} evolution {width}", draw_evolution(everything, limits), width)

@@ -186,7 +186,7 @@ fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
 fn curves_and_the_python_module_give_the_exact_fields() {
     let directory = TestDirectory::new();
     directory.run(&["--set", "discretisation.displacement=2"]);
-    let words = ["figures", "out/scene", "--line", "0.5,0,0.5,1.5", "--quantity", "u_y,stress_yy"];
+    let words = ["plot", "out/scene", "--line", "0.5,0,0.5,1.5", "--quantity", "u_y,stress_yy"];
     let Some(said) =
         directory.say_python(&[&words[..], &["--times", "0.5,1", "--format", "svg"]].concat())
     else {
@@ -204,20 +204,19 @@ fn curves_and_the_python_module_give_the_exact_fields() {
         }
     }
     directory
-        .say(&["figures", "out/scene", "--along", "none"])
+        .say(&["plot", "out/scene", "--along", "none"])
         .fails(2, &["there is no boundary none"]);
     // Γ_C is the bottom.
-    let inside =
-        ["figures", "out/scene", "--line", "0.5,0.5,0.5,1", "--quantity", "normal_pressure"];
+    let inside = ["plot", "out/scene", "--line", "0.5,0.5,0.5,1", "--quantity", "normal_pressure"];
     directory.say(&inside).fails(2, &["normal_pressure has no values along this line"]);
-    let abscissa = ["figures", "out/scene", "--abscissa", "none"];
+    let abscissa = ["plot", "out/scene", "--abscissa", "none"];
     directory.say(&abscissa).fails(2, &["history.csv has no column none; it has step, time"]);
-    let material = ["figures", "out/scene", "--material", "none"];
+    let material = ["plot", "out/scene", "--material", "none"];
     directory.say(&material).fails(2, &["no triangle has the material none"]);
-    let alone = ["figures", "out/scene", "--times", "1"];
+    let alone = ["plot", "out/scene", "--times", "1"];
     assert_eq!(directory.say(&alone).code, Some(2));
     // A column of a journal, without the margins that are cut off.
-    let column = ["figures", "out/scene", "study.csv", "--width", "3.5"];
+    let column = ["plot", "out/scene", "study.csv", "--width", "3.5"];
     directory.write("study.csv", "");
     assert_eq!(directory.say(&column).code, Some(0));
     for picture in ["setting", "stress-damage", "principal-stresses", "pressure"] {

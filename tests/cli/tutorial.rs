@@ -36,7 +36,7 @@ fn every_command_of_the_tutorial_does_what_it_says() {
             "sh" => {
                 for line in content.lines().filter(|line| line.starts_with("signorini ")) {
                     // Figures have tests of their own.
-                    if line.starts_with("signorini figures") {
+                    if line.starts_with("signorini plot") {
                         continue;
                     }
                     let (typed, comment) = line.split_once('#').unwrap_or((line, ""));

@@ -7,7 +7,7 @@ use crate::support::{ORDERS, distorted, layered, moved, problem, square, turn, u
 use nalgebra::{DMatrix, DVector, Vector3};
 use signorini::{
     estimate::{EquilibratedStress, Simulation},
-    evolution::{Choices, ContactStep, Phases, State},
+    evolution::{Choices, ContactStep, State},
     fem::{Body, Location},
     mesh::{Mesh, Order, Refinement},
     petsc::Session,
@@ -53,8 +53,8 @@ fn true_error(problem: &DiscreteProblem, state: &State) -> f64 {
     scene.order = Order::Quadratic;
     let fine = DiscreteProblem::new(scene, finer.mesh).unwrap();
     let session = Session::start(&[]).unwrap();
-    let (choices, phases) = (Choices::of(fine.scene()), Phases::default());
-    let mut step = ContactStep::new(&session, &fine, &choices, &phases).unwrap();
+    let choices = Choices::of(fine.scene());
+    let mut step = ContactStep::new(&session, &fine, &choices).unwrap();
     let exact = step.solve(0, state.time, &zeta).unwrap().state.u;
     let difference = difference(body, &state.u, &fine.body, &parents, &exact);
     let own = square_norm(problem, &state.zeta, &state.u);
@@ -82,7 +82,7 @@ fn difference(body: &Body, u: &[f64], finer: &Body, parents: &[usize], exact: &[
 /// The proved bound of a scene, with the true error.
 fn errors(mesh: Mesh, text: &str) -> [f64; 2] {
     let problem = problem(mesh, text).unwrap_or_else(|e| panic!("{e}"));
-    let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
+    let outcome = Simulation::new(&problem).bound().run(&Session::start(&[]).unwrap()).unwrap();
     let errors = &outcome.errors;
     let bound = errors.displacement_bound.unwrap_or_else(|| panic!("{:?}", errors.reservations));
     [bound, true_error(&problem, &outcome.last.state)]
@@ -112,7 +112,8 @@ fn it_is_rounding_where_the_element_has_the_exact_answer() {
         for degree in 1..=2 {
             let text = format!("discretisation.displacement = {degree}\n{pulled}");
             let problem = problem(mesh.clone(), &text).unwrap();
-            let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
+            let outcome =
+                Simulation::new(&problem).bound().run(&Session::start(&[]).unwrap()).unwrap();
             let bound = outcome.errors.displacement_bound.unwrap();
             assert!(bound < 1e-7, "P{degree}, {} triangles: {bound:e}", mesh.triangles.len());
         }
@@ -265,7 +266,8 @@ fn what_the_proof_leaves_out_is_named() {
         for order in ORDERS {
             let text = format!("discretisation.displacement = {}\n", order as usize + 1);
             let problem = problem(square(4), &(text + &scene(force, gap))).unwrap();
-            let outcome = Simulation::new(&problem).run(&Session::start(&[]).unwrap()).unwrap();
+            let outcome =
+                Simulation::new(&problem).bound().run(&Session::start(&[]).unwrap()).unwrap();
             assert_eq!(outcome.errors.reservations, named, "{force}, {gap}");
         }
     }
@@ -343,8 +345,8 @@ fn balanced(
     let degree = problem.scene().order as usize + 1;
     let session = Session::start(&[]).unwrap();
     let state = Simulation::new(&problem).run(&session).unwrap().last.state;
-    let (choices, phases) = (Choices::of(problem.scene()), Phases::default());
-    let mut step = ContactStep::new(&session, &problem, &choices, &phases).unwrap();
+    let choices = Choices::of(problem.scene());
+    let mut step = ContactStep::new(&session, &problem, &choices).unwrap();
     let state = step.solve(0, state.time, &state.zeta).unwrap().state;
     let mut stress = EquilibratedStress::new(&mut step, &state).unwrap().unwrap();
     stress.improve();
@@ -443,4 +445,28 @@ fn the_stress_balances_the_loads_whatever_holds_the_body() {
             balanced(unstructured(0.2), &text, [0.0, force]);
         }
     }
+}
+
+/// A bound is proved where it is asked for; a plain run estimates, and says so.
+#[test]
+fn a_run_proves_a_bound_only_if_it_is_asked_for() {
+    let pressed = "material = { young = 3, poisson = 0.3, plane = 'strain' }
+         boundary = [
+            { name = 'left', symmetry = true },
+            { name = 'bottom', gap = 0 },
+            { name = 'top', traction = ['0.1*x', -0.1] },
+         ]";
+    let problem = problem(square(4), pressed).unwrap();
+    let session = Session::start(&[]).unwrap();
+    let plain = Simulation::new(&problem).run(&session).unwrap().errors;
+    let proved = Simulation::new(&problem).bound().run(&session).unwrap().errors;
+    let bound = proved.displacement_bound.expect("a bound");
+    assert!(plain.displacement_bound.is_none() && plain.reservations.is_empty(), "{plain:?}");
+    assert!(plain.displacement_mesh > 0.0 && bound >= proved.displacement_mesh, "{proved:?}");
+    assert!(
+        plain.lines(None)[0].ends_with(" % (energy norm, estimated)"),
+        "{:?}",
+        plain.lines(None)
+    );
+    assert!(proved.lines(None)[0].contains("u at most "), "{:?}", proved.lines(None));
 }

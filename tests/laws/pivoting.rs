@@ -10,7 +10,6 @@ use signorini::{
     linear::{LinearSolver, Precision},
     mesh::Mesh,
     petsc::{Communicator, Matrix, Pattern, Session, Vector},
-    phases::Phases,
 };
 
 const TOLERANCE: f64 = 1e-10;
@@ -66,7 +65,6 @@ impl Small {
             },
             tolerance: TOLERANCE,
             comm: Communicator::serial(),
-            phases: &Phases::default(),
         };
         let options = ContactOptions::default();
         let chosen = ChosenSolver::Named(name.to_owned());

@@ -4,7 +4,7 @@ use crate::support::{Random, close, difference, distorted, history, problem, sam
 use signorini::{
     contact::SOLVERS,
     estimate::Simulation,
-    evolution::{Choices, ContactStep, DiscreteProblem, Phases, RunError, Step},
+    evolution::{Choices, ContactStep, DiscreteProblem, RunError, Step},
     petsc::Session,
 };
 
@@ -33,9 +33,8 @@ fn zeta(problem: &DiscreteProblem, mean: f64) -> Vec<f64> {
 /// Two accepted steps by one solver, with `tries` (time, ζ, whether it succeeds) made between them
 /// and not accepted; the second step.
 fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
-    let (session, phases) = (Session::start(&[]).unwrap(), Phases::default());
-    let mut contact_step =
-        ContactStep::new(&session, problem, &Choices::named(solver), &phases).unwrap();
+    let session = Session::start(&[]).unwrap();
+    let mut contact_step = ContactStep::new(&session, problem, &Choices::named(solver)).unwrap();
     contact_step.solve(1, 0.9, &zeta(problem, 0.9)).unwrap();
     contact_step.accept(0.9).unwrap();
     for (time, zeta, succeeds) in tries {

@@ -105,7 +105,7 @@ impl ActiveSet {
         }
         let (start, before) = (AtBounds::new(problem, c, Vec::new())?, active.to_vec());
         report.factorisations += elastic.prepare(system)?;
-        let found = match elastic.condense(system)? {
+        let found = match elastic.condense()? {
             Some(mut condensed) => {
                 pivot_condensed(problem, active, &start, &mut condensed, report)?
             }

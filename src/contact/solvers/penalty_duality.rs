@@ -191,7 +191,7 @@ fn solve_condensed(
     for _ in 0..OUTER {
         let start = problem.at_bounds(c)?;
         report.factorisations += elastic.prepare(system)?;
-        let condensed = elastic.condense(system)?;
+        let condensed = elastic.condense()?;
         let mut condensed =
             condensed.ok_or(ContactError::NotDefinite { method: PENALTY_DUALITY.name })?;
         p = fixed_point.find_condensed(problem, &p, &start, &mut condensed, &mut report)?;

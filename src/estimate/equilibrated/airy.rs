@@ -3,8 +3,8 @@
 //! A stress without forces has an Airy function φ, σ_xx = φ_yy, σ_yy = φ_xx, σ_xy = −φ_xy. With G = (φ_y, −φ_x) its traction on
 //! a side is dG/ds, so the forces on a side from a to b are ∫ τn ψ_a = Ḡ − G_a and ∫ τn ψ_b = G_b − Ḡ, with the mean Ḡ on the
 //! side. The stresses of the composite element with k = 1 are those of the functions of Clough and Tocher: φ and ∇φ at the
-//! vertices and the mean of the normal derivative on each side determine them. In each star, φ and ∇φ of its vertex and the
-//! normal derivatives on its sides are free, and for k = 2 also the bubbles of the tractions.
+//! vertices and the mean of the normal derivative on each side determine φ. In each star, φ and ∇φ at its vertex and the mean
+//! normal derivatives on the sides at the vertex are free, and for k = 2 also the bubbles of the tractions on these sides.
 
 use super::{
     composite::{Composite, Frame, SideForces},
@@ -25,7 +25,7 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
     is_wanted: &dyn Fn(&Star) -> bool,
     forces: &mut [SideForces],
 ) {
-    // The functions of a side, and those before them.
+    // The number of functions per side of the star, and that of the vertex (φ and the two components of ∇φ), which come first.
     let (of_side, of_centre) = ((C - 3) / 2, 3);
     for star in stars.iter().filter(|star| is_wanted(star)) {
         let count = star.triangles.len() + usize::from(!star.is_closed);
@@ -35,14 +35,15 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
             let edge = || boundary.get(&sorted([star.node, star.end(triangles, j)]));
             !is_boundary || edge().is_some_and(|edge| edge.known().is_empty())
         };
-        // The unit of φ, a length. With another one in each triangle of the star, the tractions would jump between them.
+        // φ at the vertex is divided by this length, m, so that all unknowns have one unit. All triangles of the star take the
+        // same length: with lengths of their own the tractions on their common sides would differ.
         let length = star.triangles.first().map_or(1.0, |&(t, _)| triangles[t].area.sqrt());
         let has_centre = star.is_closed || (is_free(0) && is_free(count - 1));
         let size = of_centre + of_side * count;
         let mut gram = DMatrix::<f64>::zeros(size, size);
         let mut right = DVector::<f64>::zeros(size);
-        // The places of the functions of triangle j among the unknowns of the star.
-        let places = |j: usize| {
+        // The numbers of the functions of triangle j among the unknowns of the star.
+        let numbers = |j: usize| {
             let first = [j, if j + 1 < count { j + 1 } else { 0 }].map(|j| of_centre + of_side * j);
             std::array::from_fn::<usize, C, _>(|c| match c.checked_sub(of_centre) {
                 None => c,
@@ -61,13 +62,13 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
             let form =
                 composite.form(i, &(frame.metric(&triangle.compliance) * triangle.zeta.recip()));
             let (sides, body) = difference(triangle, &forces[t]);
-            let error = Composite::<R, D>::ordered(i, &frame.inverse, &sides, &body);
+            let error = Composite::<R, D>::permuted(i, &frame.inverse, &sides, &body);
             let gradient = local.transpose() * (form * error);
             let own = local.transpose() * (form.fixed_columns::<R>(0) * local);
-            let places = places(j);
-            for (c, column) in places.into_iter().enumerate() {
+            let numbers = numbers(j);
+            for (c, column) in numbers.into_iter().enumerate() {
                 right[column] -= gradient[c];
-                places.iter().enumerate().for_each(|(r, row)| gram[(*row, column)] += own[(r, c)]);
+                numbers.iter().enumerate().for_each(|(r, row)| gram[(*row, column)] += own[(r, c)]);
             }
         }
         let fixed_sides = (0..count).filter(|j| !is_free(*j)).flat_map(|j| {
@@ -83,8 +84,8 @@ pub(super) fn improve<const R: usize, const D: usize, const C: usize>(
         let Some(gram) = gram.cholesky() else { continue };
         gram.solve_mut(&mut right);
         for (j, &(t, i)) in star.triangles.iter().enumerate() {
-            let places = places(j);
-            let own = SMatrix::<f64, C, 1>::from_fn(|c, _| right[places[c]]);
+            let numbers = numbers(j);
+            let own = SMatrix::<f64, C, 1>::from_fn(|c, _| right[numbers[c]]);
             let change = functions::<R, C>(&triangles[t], i, length) * own;
             let used = R / 4;
             for (k, side) in [i, (i + 2) % 3].into_iter().enumerate() {

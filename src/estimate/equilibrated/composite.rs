@@ -87,7 +87,7 @@ pub(super) struct LoadedTriangle<'a> {
 }
 
 impl<const R: usize, const D: usize> Composite<R, D> {
-    /// ∫ σ : A⁻¹ σ as a bilinear form of the forces on both sides at the vertex i and of all forces, as in [`Self::ordered`], for a
+    /// ∫ σ : A⁻¹ σ as a bilinear form of the forces on both sides at the vertex i and of all forces, as in [`Self::permuted`], for a
     /// [`Frame::metric`].
     pub(super) fn form(&self, i: usize, metric: &Matrix3<f64>) -> SMatrix<f64, R, D> {
         let [a, b, c, d, e, f] = PAIRS.map(|at| metric[at]);
@@ -101,16 +101,16 @@ impl<const R: usize, const D: usize> Composite<R, D> {
     }
 
     /// The numbers of all components of forces: those of the first and the last side of the vertex i, then the others.
-    fn order(i: usize) -> [usize; D] {
+    fn permutation(i: usize) -> [usize; D] {
         let side = D / 3 - 2;
         let sides =
             [i, (i + 2) % 3, (i + 1) % 3].into_iter().flat_map(|s| side * s..side * (s + 1));
-        let mut order = sides.chain(3 * side..D);
-        std::array::from_fn(|_| order.next().unwrap_or_default())
+        let mut numbers = sides.chain(3 * side..D);
+        std::array::from_fn(|_| numbers.next().unwrap_or_default())
     }
 
-    /// The forces on the reference triangle, in the order for the vertex i.
-    pub(super) fn ordered(
+    /// The forces on the reference triangle, permuted for the vertex i.
+    pub(super) fn permuted(
         i: usize,
         inverse: &Matrix2<f64>,
         sides: &SideForces,
@@ -181,94 +181,11 @@ impl<const R: usize, const D: usize> Composite<R, D> {
     }
 
     /// The stress in part s, of the corners s and s + 1 and the centroid, is a polynomial of its barycentric coordinates. Its
-    /// coefficients solve the equations of the tractions, of their continuity and of the divergence, in least squares.
+    /// coefficients x solve the equations A x = B F of the tractions, of their continuity and of the divergence for forces F, in
+    /// least squares: x = (AᵀA)⁺ AᵀB F. The stresses without forces are the null space of A.
     fn new(degree: usize) -> Self {
-        const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-        const CENTRE: [f64; 2] = [1.0 / 3.0; 2];
-        let part = |s: usize| [CORNERS[s], CORNERS[(s + 1) % 3], CENTRE];
-        let (size, unknowns) =
-            (monomials(degree, [0.0; 3]).len(), 9 * monomials(degree, [0.0; 3]).len());
-        let index = |s: usize, i: usize, component: usize| 3 * (size * s + i) + component;
-        let (mut rows, mut forces) = (Vec::new(), Vec::new());
-        let mut equation = |row: DVector<f64>, force: DVector<f64>| {
-            rows.push(row.transpose());
-            forces.push(force.transpose());
-        };
-        // Adds `weight` times the component of τn in part s.
-        let add_traction = |row: &mut DVector<f64>,
-                            s: usize,
-                            at: [f64; 3],
-                            n: [f64; 2],
-                            of: usize,
-                            weight: f64| {
-            for (i, value) in monomials(degree, at).into_iter().enumerate() {
-                row[index(s, i, of)] += weight * value * n[of];
-                row[index(s, i, 2)] += weight * value * n[1 - of];
-            }
-        };
-        let normal = |[ax, ay]: [f64; 2], [bx, by]: [f64; 2]| [by - ay, ax - bx];
-        for s in 0..3 {
-            let [a, b, _] = part(s);
-            for function in 0..=degree {
-                for of in 0..2 {
-                    let mut row = DVector::zeros(unknowns);
-                    for [r, weight] in THREE_GAUSS {
-                        let value = [1.0 - r, r, 4.0 * r * (1.0 - r)][function];
-                        add_traction(
-                            &mut row,
-                            s,
-                            [1.0 - r, r, 0.0],
-                            normal(a, b),
-                            of,
-                            weight * value,
-                        );
-                    }
-                    let mut force = DVector::zeros(D);
-                    force[2 * ((degree + 1) * s + function) + of] = 1.0;
-                    equation(row, force);
-                }
-            }
-            for place in 0..=degree {
-                let (r, n) = (place as f64 / degree as f64, normal(a, CENTRE));
-                for of in 0..2 {
-                    let mut row = DVector::zeros(unknowns);
-                    add_traction(&mut row, s, [1.0 - r, 0.0, r], n, of, 1.0);
-                    add_traction(&mut row, (s + 2) % 3, [0.0, 1.0 - r, r], n, of, -1.0);
-                    equation(row, DVector::zeros(D));
-                }
-            }
-            // −div τ is f_B, which has the given forces F_i at the hat functions, with |T| = ½. For k = 1 it is constant on
-            // each part: (4 Σ F − 9 F_i)/|T| on the part opposite to the corner i. For k = 2 it is affine: 3 (4 F_i − Σ F)/|T|
-            // at the corner i.
-            let gradients = *Triangle::new(part(s)).gradients();
-            let corner = |i: usize| [0, 1, 2].map(|j| f64::from(i == j));
-            let places = if degree == 1 {
-                vec![[1.0 / 3.0; 3]]
-            } else {
-                vec![corner(0), corner(1), corner(2)]
-            };
-            for at in places {
-                let here = Matrix3::from_columns(&part_corners(s)) * Vector3::from(at);
-                for of in 0..2 {
-                    let mut row = DVector::zeros(unknowns);
-                    for (i, slope) in derivatives(degree, at).into_iter().enumerate() {
-                        let [x, y] =
-                            [0, 1].map(|k| (0..3).map(|j| slope[j] * gradients[j][k]).sum::<f64>());
-                        row[index(s, i, of)] += [x, y][of];
-                        row[index(s, i, 2)] += [y, x][of];
-                    }
-                    let mut force = DVector::zeros(D);
-                    for i in 0..3 {
-                        let opposite = f64::from(i == (s + 2) % 3);
-                        let own =
-                            if degree == 1 { 4.0 - 9.0 * opposite } else { 12.0 * here[i] - 3.0 };
-                        force[6 * (degree + 1) + 2 * i + of] = -own / 0.5;
-                    }
-                    equation(row, force);
-                }
-            }
-        }
-        let (rows, forces) = (DMatrix::from_rows(&rows), DMatrix::from_rows(&forces));
+        let (rows, forces) = Equations::<D>::matrices(degree);
+        let unknowns = rows.ncols();
         let eigen = (rows.transpose() * &rows).symmetric_eigen();
         let cut = 1e-10 * eigen.eigenvalues.max();
         let inverse = eigen.eigenvalues.map(|value| if value > cut { 1.0 / value } else { 0.0 });
@@ -280,50 +197,183 @@ impl<const R: usize, const D: usize> Composite<R, D> {
         let mut values = DMatrix::zeros(VALUES, unknowns);
         for (q, (s, at, _)) in rule.iter().enumerate() {
             for (i, value) in monomials(degree, *at).into_iter().enumerate() {
-                (0..3).for_each(|of| values[(3 * q + of, index(*s, i, of))] = value);
+                (0..3).for_each(|of| values[(3 * q + of, coefficient(degree, *s, i, of))] = value);
             }
         }
         let mut stresses = &values * coefficients;
         let free = (0..unknowns).filter(|&i| eigen.eigenvalues[i] <= cut);
         let free = Vec::from_iter(free.map(|i| &values * basis.column(i)));
         let weights = DVector::from_fn(VALUES, |i, _| rule[i / 3].2);
-        if !free.is_empty() {
-            // The smallest stresses of the family.
-            let free = DMatrix::from_columns(&free);
-            let weighted = DMatrix::from_fn(free.ncols(), VALUES, |i, j| free[(j, i)] * weights[j]);
-            if let Some(gram) = (&weighted * &free).cholesky() {
-                stresses -= &free * gram.solve(&(weighted * &stresses));
-            }
-        }
-        let product = |i: usize, j: usize| {
-            let rows = |of: usize| {
-                DMatrix::from_fn(RULE_SIZE, D, |q, force| stresses[(3 * q + of, force)])
-            };
-            let weighted = DMatrix::from_fn(RULE_SIZE, D, |q, force| {
-                weights[3 * q] * stresses[(3 * q + i, force)]
-            });
-            let product = weighted.transpose() * rows(j);
-            if i == j { product } else { &product + product.transpose() }
-        };
-        let products = PAIRS.map(|(i, j)| product(i, j));
+        subtract_projection(&mut stresses, &free, &weights);
+        let products = PAIRS.map(|pair| product::<D>(&stresses, &weights, pair));
         let of_vertex = |i: usize| {
-            let order = Self::order(i);
-            products
-                .each_ref()
-                .map(|product| SMatrix::from_fn(|r, c| product[(order[r], order[c])]))
+            let numbers = Self::permutation(i);
+            let permuted =
+                |product: &DMatrix<f64>| SMatrix::from_fn(|r, c| product[(numbers[r], numbers[c])]);
+            products.each_ref().map(permuted)
+        };
+        let in_triangle = |(s, at, weight): (usize, [f64; 3], f64)| {
+            (<[f64; 3]>::from(Matrix3::from_columns(&part_corners(s)) * Vector3::from(at)), weight)
         };
         Self {
             products: [0, 1, 2].map(of_vertex),
-            points: rule.map(|(s, at, weight)| {
-                (
-                    <[f64; 3]>::from(Matrix3::from_columns(&part_corners(s)) * Vector3::from(at)),
-                    weight,
-                )
-            }),
+            points: rule.map(in_triangle),
             stresses: SMatrix::from_fn(|i, j| stresses[(i, j)]),
             free: free.iter().map(|of| SVector::from_iterator(of.iter().copied())).collect(),
         }
     }
+}
+
+/// The number of the coefficient of the monomial i of a component of the stress in part s.
+fn coefficient(degree: usize, s: usize, i: usize, component: usize) -> usize {
+    3 * (monomials(degree, [0.0; 3]).len() * s + i) + component
+}
+
+/// The equations A x = B F for the coefficients x of a stress in the reference triangle, and the D components of forces F.
+struct Equations<const D: usize> {
+    degree: usize,
+    /// The rows of A, and those of B.
+    rows: Vec<DVector<f64>>,
+    forces: Vec<DVector<f64>>,
+}
+
+impl<const D: usize> Equations<D> {
+    /// A and B.
+    fn matrices(degree: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+        let mut equations = Self { degree, rows: Vec::new(), forces: Vec::new() };
+        for s in 0..3 {
+            equations.add_side(s);
+            equations.add_continuity(s);
+            equations.add_divergence(s);
+        }
+        let matrix = |of: &[DVector<f64>]| {
+            DMatrix::from_rows(&Vec::from_iter(of.iter().map(DVector::transpose)))
+        };
+        (matrix(&equations.rows), matrix(&equations.forces))
+    }
+
+    /// A row of A and a row of B, both zero. The functions that add equations fill them.
+    fn next(&mut self) -> (&mut DVector<f64>, &mut DVector<f64>) {
+        self.rows.push(DVector::zeros(coefficient(self.degree, 3, 0, 0)));
+        self.forces.push(DVector::zeros(D));
+        let last = self.rows.len() - 1;
+        (&mut self.rows[last], &mut self.forces[last])
+    }
+
+    /// On the side s of the triangle τn has the given forces: ∫ τn ψ = F for the hat functions of both ends and, for k = 2, the
+    /// bubble.
+    fn add_side(&mut self, s: usize) {
+        let ([a, b, _], degree) = (part(s), self.degree);
+        for function in 0..=degree {
+            for of in 0..2 {
+                let (row, force) = self.next();
+                for [r, weight] in THREE_GAUSS {
+                    let value = [1.0 - r, r, 4.0 * r * (1.0 - r)][function];
+                    add_traction(
+                        row,
+                        degree,
+                        (s, [1.0 - r, r, 0.0]),
+                        (normal(a, b), of),
+                        weight * value,
+                    );
+                }
+                force[2 * ((degree + 1) * s + function) + of] = 1.0;
+            }
+        }
+    }
+
+    /// From the corner s to the centroid τn is the same in both parts, at k + 1 points.
+    fn add_continuity(&mut self, s: usize) {
+        let ([a, ..], degree) = (part(s), self.degree);
+        for point in 0..=degree {
+            let (r, n) = (point as f64 / degree as f64, normal(a, CENTRE));
+            for of in 0..2 {
+                let (row, _) = self.next();
+                add_traction(row, degree, (s, [1.0 - r, 0.0, r]), (n, of), 1.0);
+                add_traction(row, degree, ((s + 2) % 3, [0.0, 1.0 - r, r]), (n, of), -1.0);
+            }
+        }
+    }
+
+    /// In part s −div τ is f_B, which has the given forces F_i at the hat functions, with |T| = ½. For k = 1 it is constant on
+    /// each part: (4 Σ F − 9 F_i)/|T| on the part opposite to the corner i. For k = 2 it is affine: 3 (4 F_i − Σ F)/|T|
+    /// at the corner i.
+    fn add_divergence(&mut self, s: usize) {
+        let degree = self.degree;
+        let gradients = *Triangle::new(part(s)).gradients();
+        let corner = |i: usize| [0, 1, 2].map(|j| f64::from(i == j));
+        let points =
+            if degree == 1 { vec![[1.0 / 3.0; 3]] } else { Vec::from([0, 1, 2].map(corner)) };
+        for at in points {
+            let here = Matrix3::from_columns(&part_corners(s)) * Vector3::from(at);
+            for of in 0..2 {
+                let (row, force) = self.next();
+                for (i, slope) in derivatives(degree, at).into_iter().enumerate() {
+                    let [x, y] =
+                        [0, 1].map(|k| (0..3).map(|j| slope[j] * gradients[j][k]).sum::<f64>());
+                    row[coefficient(degree, s, i, of)] += [x, y][of];
+                    row[coefficient(degree, s, i, 2)] += [y, x][of];
+                }
+                for i in 0..3 {
+                    let opposite = f64::from(i == (s + 2) % 3);
+                    let own = if degree == 1 { 4.0 - 9.0 * opposite } else { 12.0 * here[i] - 3.0 };
+                    force[6 * (degree + 1) + 2 * i + of] = -own / 0.5;
+                }
+            }
+        }
+    }
+}
+
+/// Adds to a row `weight` times a component of τn, for a point in part s.
+fn add_traction(
+    row: &mut DVector<f64>,
+    degree: usize,
+    (s, at): (usize, [f64; 3]),
+    (n, of): ([f64; 2], usize),
+    weight: f64,
+) {
+    for (i, value) in monomials(degree, at).into_iter().enumerate() {
+        row[coefficient(degree, s, i, of)] += weight * value * n[of];
+        row[coefficient(degree, s, i, 2)] += weight * value * n[1 - of];
+    }
+}
+
+/// Subtracts from the stresses their parts in the span of `free`: of each family, the least stress in L² remains.
+fn subtract_projection(stresses: &mut DMatrix<f64>, free: &[DVector<f64>], weights: &DVector<f64>) {
+    if free.is_empty() {
+        return;
+    }
+    let free = DMatrix::from_columns(free);
+    let weighted = DMatrix::from_fn(free.ncols(), VALUES, |i, j| free[(j, i)] * weights[j]);
+    if let Some(gram) = (&weighted * &free).cholesky() {
+        *stresses -= &free * gram.solve(&(weighted * &*stresses));
+    }
+}
+
+/// ∫ (σ_i σ_j + σ_j σ_i)/|T|, or ∫ σ_i²/|T| if i = j, as a bilinear form of all forces.
+fn product<const D: usize>(
+    stresses: &DMatrix<f64>,
+    weights: &DVector<f64>,
+    (i, j): (usize, usize),
+) -> DMatrix<f64> {
+    let weighted =
+        DMatrix::from_fn(RULE_SIZE, D, |q, force| weights[3 * q] * stresses[(3 * q + i, force)]);
+    let other = DMatrix::from_fn(RULE_SIZE, D, |q, force| stresses[(3 * q + j, force)]);
+    let product = weighted.transpose() * other;
+    if i == j { product } else { &product + product.transpose() }
+}
+
+const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+const CENTRE: [f64; 2] = [1.0 / 3.0; 2];
+
+/// The corners of part s of the reference triangle.
+fn part(s: usize) -> [[f64; 2]; 3] {
+    [CORNERS[s], CORNERS[(s + 1) % 3], CENTRE]
+}
+
+/// The outward normal of the edge ab, as long as the edge.
+fn normal([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> [f64; 2] {
+    [by - ay, ax - bx]
 }
 
 /// The first and second corner of the part in which the point q lies, and the corner opposite to it.

@@ -6,17 +6,18 @@
 //!
 //! ‖u − u_h‖² ≤ ∫ (ζA)⁻¹(τ − ζAε(u_h)) : (τ − ζAε(u_h)) + 2 ∫_{Γ_C} p (g − u_h·ν).
 //!
-//! There is no constant and no guess in it. τ is made in four steps:
+//! The bound contains no unknown constant. τ is made in four steps:
 //!
-//! 1. `pressure`: p ≥ 0 on Γ_C from the reactions at the nodes. Both are not the same forces at all nodes, so w with
-//!    K w = f − pν − K u_h corrects u_h.
+//! 1. `pressure`: a pressure p ≥ 0 on Γ_C near the reactions at the nodes. The nodal forces of p differ from these reactions, so
+//!    u_h is corrected by the w with K w = f − pν − K u_h: then u_h + w is in equilibrium with p.
 //! 2. `stars`: tractions on all sides that balance each triangle, from ζAε(u_h + w).
-//! 3. `airy`: better tractions, without new forces.
+//! 3. `airy`: tractions with a smaller bound; the changes carry no forces.
 //! 4. `composite`: the stress in each triangle from its tractions.
 
 mod airy;
 mod composite;
 mod pressure;
+mod reservations;
 mod stars;
 
 use super::recovery::at_vertices;
@@ -28,7 +29,7 @@ use crate::{
     model::Material,
     petsc::PetscError,
     problem::{DiscreteProblem, ElementLoads, State},
-    scene::{Condition, Expression},
+    scene::Condition,
 };
 use composite::{Frame, LoadedTriangle, SideForces};
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -41,7 +42,7 @@ use stars::{BoundaryEdge, Star, StressedTriangle};
 pub struct ProvedError {
     /// The bound over ‖u_h‖.
     pub relative: f64,
-    /// What the proof leaves out.
+    /// The data of the scene that the proof leaves out.
     pub left_out: Vec<&'static str>,
 }
 
@@ -60,8 +61,6 @@ const FALLS: f64 = 0.95;
 const MOST_SWEEPS: usize = 16;
 /// The sweeps over the stars at the interfaces of ranks. With them two and three ranks print nearly the bound of one.
 const INTERFACE_SWEEPS: usize = 4;
-/// Functions may jump at vertices, so this part of a triangle or of a side at its ends does not count.
-const AT_JUMP: f64 = 1e-9;
 /// The residual of the correction w, relative to all forces.
 const CORRECTION: f64 = 0.1 * IMBALANCE;
 
@@ -85,7 +84,7 @@ pub(crate) fn proved_error(
         let square = stress.square();
         let relative = stress.bound(square);
         if relative <= ENOUGH * estimate || square > FALLS * before || sweep == MOST_SWEEPS {
-            let left_out = left_out(stress.problem, &stress.edges, state.time);
+            let left_out = reservations::of(stress.problem, &stress.edges, state.time);
             return Ok(Ok(ProvedError { relative, left_out }));
         }
         before = square;
@@ -413,50 +412,9 @@ fn summed(body: &Body, parts: Vec<SideForces>) -> Vec<SideForces> {
 
 /// Tractions with a part of the changes that the ranks have made to those of their stars. Collective.
 fn joined(body: &Body, before: &[SideForces], after: &[SideForces], part: f64) -> Vec<SideForces> {
-    let of = |(a, b): (&SideForces, &SideForces), factor: f64| {
-        std::array::from_fn(|s| std::array::from_fn(|k| a[s][k] + factor * b[s][k]))
+    let of = |(a, b): (&SideForces, &SideForces), multiple: f64| {
+        std::array::from_fn(|s| std::array::from_fn(|k| a[s][k] + multiple * b[s][k]))
     };
     let changes = Vec::from_iter(after.iter().zip(before).map(|pair| of(pair, -1.0)));
     before.iter().zip(&summed(body, changes)).map(|pair| of(pair, part)).collect()
-}
-
-/// What the proof leaves out: functions of the scene that are no polynomials of the degrees that it takes in the triangles and on
-/// their sides. Collective.
-fn left_out(problem: &DiscreteProblem, edges: &[ContactEdge], time: f64) -> Vec<&'static str> {
-    let (body, scene) = (&problem.body, problem.scene());
-    let degree = body.order() as u32 + 1;
-    // Is f a polynomial of at most the `degree` between these vertices? It may have jumps at them.
-    let varies = |f: &Expression, vertices: &[usize], degree: u32| {
-        let range = |k: usize| {
-            let values = vertices.iter().map(|vertex| body.mesh.nodes[*vertex][k]);
-            let [low, high] = values
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                    [low.min(value), high.max(value)]
-                });
-            let within = AT_JUMP * (high - low);
-            [low + within, high - within]
-        };
-        f.degree([range(0), range(1), [time; 2]]).is_none_or(|of| of > degree)
-    };
-    let (mut loads, mut values) = (false, false);
-    for force in &scene.body_force {
-        loads |= body.mesh.triangles.iter().any(|triangle| varies(force, triangle, degree - 1));
-    }
-    for part in &scene.boundaries {
-        for condition in &part.conditions {
-            for function in condition.expressions().into_iter().flatten() {
-                let mut edges = body.mesh.edges_of(&part.name).iter();
-                let found = edges.any(|ends| varies(function, ends, degree));
-                *(if condition.is_support() { &mut values } else { &mut loads }) |= found;
-            }
-        }
-    }
-    let comm = body.nodes.partition.comm();
-    let parts = [
-        (loads, "loads vary within triangles"),
-        (values, "gaps or displacements vary between nodes"),
-        (problem.has_chords, "curved sides are chords"),
-        (edges.iter().any(|edge| edge.is_turned), "the contact surface turns at nodes"),
-    ];
-    parts.into_iter().filter_map(|(found, name)| comm.any(found).then_some(name)).collect()
 }

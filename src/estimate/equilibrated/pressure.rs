@@ -1,12 +1,13 @@
 //! The contact pressure of the proof: p ≥ 0 on Γ_C, with the reactions at the nodes where that is possible.
 //!
 //! On an edge p = p_a (1 − s)² + 2c s (1 − s) + p_b s², with c = (p_a + p_b)/2 for elements of first order. All coefficients are at
-//! least 0. Of these pressures, p is nearest in L² to the one with the reactions of the nodes. It acts along −ν of the nodes.
+//! least 0. Among these pressures, p is the nearest in L² to the pressure that has the reactions as its nodal forces. p acts
+//! along −ν of the nodes.
 
 use super::Side;
 use crate::{
     fem::RigidMotion,
-    problem::{ContactRow, DiscreteProblem, State},
+    problem::{ContactRow, DiscreteProblem, State, rows_of},
     scene::Boundary,
 };
 use nalgebra::{DMatrix, DVector, Vector2};
@@ -65,13 +66,9 @@ impl Foundation {
         let (body, scene) = (&problem.body, problem.scene());
         let (rows, _) = problem.supports.contact.rows(body, state);
         let boundaries = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
-        let rows_of = |name: &str| {
-            let mut parts = rows.chunk_by(|a, b| a.boundary == b.boundary);
-            parts.find(|rows| rows[0].boundary == name).unwrap_or_default()
-        };
         let of_boundary = |boundary: &Boundary| {
             let normal = boundary.gap().and_then(|gap| gap.normal);
-            Self::new(problem, rows_of(&boundary.name), (&boundary.name, normal), sides)
+            Self::new(problem, rows_of(&rows, &boundary.name), (&boundary.name, normal), sides)
         };
         boundaries.map(of_boundary).collect()
     }

@@ -4,7 +4,7 @@ use super::{Attempt, ContactStep};
 use crate::{
     contact::{Bound, ContactError, ContactProblem, ContactReport, Scales},
     evolution::{DiscreteProblem, LoadCase},
-    petsc::{PetscError, Vector},
+    petsc::{PetscError, Vector, stage},
 };
 
 /// The force scale is at least this fraction of the forces if prescribed displacements or obstacles move their own
@@ -82,13 +82,12 @@ impl ContactStep<'_> {
             ),
             tolerance: attempt.tolerance,
             comm,
-            phases: self.phases,
         };
         let bounded = bounds.iter().map(|bound| bound.dof);
         self.elastic.factor().set_condensed(contact.stiffness, bounded)?;
         let Self { solvers, elastic, c, .. } = self;
         let (solver, warm_start) = (&solvers[attempt.solver], &mut attempt.next.warm_start);
-        self.phases.time("contact", || solver.solve(&contact, elastic, warm_start, c))
+        stage("contact", || solver.solve(&contact, elastic, warm_start, c))
     }
 
     /// The load f − K u_D, and its scale F: ‖f‖₂ or, if larger, a fraction of ‖f − K u_D‖₂ or of ‖K v‖₂. u_D is

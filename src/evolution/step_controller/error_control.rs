@@ -151,7 +151,7 @@ impl<'a> ErrorControl<'a> {
     /// damage so far plus the [`Forecast`] from the present `rate` = dζ/dt, 1/s. Collective.
     ///
     /// # Errors
-    /// The error is too large: the factor by which to shorten the step.
+    /// The error is too large: the ratio by which to shorten the step.
     pub(super) fn accept(
         &mut self,
         planned: &PlannedStep,
@@ -208,7 +208,7 @@ impl<'a> ErrorControl<'a> {
     }
 }
 
-/// The factor 0.9 (error/allowed error)^(−1/3) from the length of a step to the next. The error of a step is of
+/// The ratio 0.9 (error/allowed error)^(−1/3) from the length of a step to the next. The error of a step is of
 /// third order in its length; 0.9 is a margin.
 fn growth(error_ratio: f64) -> f64 {
     0.9 / error_ratio.cbrt()

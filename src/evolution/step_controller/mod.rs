@@ -48,10 +48,10 @@ pub(crate) struct StepController<'a> {
     error_control: Option<ErrorControl<'a>>,
     /// Are the steps two-step backward differences? Otherwise they are Euler's.
     two_step: bool,
-    memory: StepState,
+    history: StepState,
 }
 
-/// The controller's memory of the accepted steps, which checkpoints keep.
+/// The controller's history of the accepted steps, which checkpoints keep.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct StepState {
     /// k_{n−1}, s; infinite before the first step, so that ω = 0.
@@ -105,7 +105,7 @@ impl<'a> StepController<'a> {
     ) -> Self {
         let zeros = DVector::zeros(zeta.len());
         let error_control = ErrorControl::new(problem, zeta, followed);
-        let memory = StepState {
+        let history = StepState {
             length: f64::INFINITY,
             zeta: DVector::from_column_slice(zeta),
             change: zeros.clone(),
@@ -121,13 +121,13 @@ impl<'a> StepController<'a> {
             error_control: None,
         };
         let bdf2 = problem.scene().time.is_some_and(|grid| grid.scheme == Scheme::Bdf2);
-        Self { problem, law, two_step: bdf2 || error_control.is_some(), error_control, memory }
+        Self { problem, law, two_step: bdf2 || error_control.is_some(), error_control, history }
     }
 
     /// The state for a checkpoint.
     pub(super) fn state(&self) -> StepState {
         let error_control = self.error_control.as_ref().map(ErrorControl::state);
-        StepState { error_control, ..self.memory.clone() }
+        StepState { error_control, ..self.history.clone() }
     }
 
     /// Goes back to the state of a checkpoint.
@@ -135,7 +135,7 @@ impl<'a> StepController<'a> {
         if let (Some(error_control), Some(state)) = (&mut self.error_control, state.error_control) {
             error_control.set_state(state);
         }
-        self.memory = state;
+        self.history = state;
     }
 
     /// Plans the step after the accepted step `last`; `None` at the end of the run.
@@ -148,19 +148,19 @@ impl<'a> StepController<'a> {
             }
             _ => return None,
         };
-        let omega = if self.two_step { length / self.memory.length } else { 0.0 };
+        let omega = if self.two_step { length / self.history.length } else { 0.0 };
         let beta = omega * omega / (1.0 + 2.0 * omega);
         let k = length * (1.0 + omega) / (1.0 + 2.0 * omega);
-        let shift = beta * &self.memory.change;
+        let shift = beta * &self.history.change;
         let (lower, upper) = shifted(
-            self.memory.bounds,
+            self.history.bounds,
             self.problem.body.vertices.partition.min_max(shift.as_slice()),
         );
         // φ ≤ 0, so b ≤ 0 and b̂_n ≥ (1 + ω) b_{n−1}. NaN must stay NaN.
-        let lower = lower + k * ((1.0 + omega) * self.memory.source.min);
-        let load = (&self.memory.source.load + omega * &self.memory.load_change)
+        let lower = lower + k * ((1.0 + omega) * self.history.source.min);
+        let load = (&self.history.source.load + omega * &self.history.load_change)
             .map(|b| if b > 0.0 { 0.0 } else { b });
-        let (start, bounds) = (&self.memory.zeta + shift, (lower, upper));
+        let (start, bounds) = (&self.history.zeta + shift, (lower, upper));
         Some(PlannedStep { n, time, length, k, start, load, bounds })
     }
 
@@ -184,21 +184,21 @@ impl<'a> StepController<'a> {
         if self.two_step {
             // The rate before the first step follows from its source, without correction.
             let first = || &rate - &correction / planned.k;
-            let change = &rate - self.memory.rate.clone().unwrap_or_else(first);
-            let increment = &corrected - &self.memory.zeta;
+            let change = &rate - self.history.rate.clone().unwrap_or_else(first);
+            let increment = &corrected - &self.history.zeta;
             let trapezoidal = planned.length * (&rate - 0.5 * &change);
             let truncation = TRUNCATION * (&trapezoidal - &increment);
             let added = &correction + truncation;
             if let Some(error_control) = &mut self.error_control
-                && let Err(factor) =
-                    error_control.accept(planned, &damage.zeta, &self.memory.error, &added, &rate)
+                && let Err(ratio) =
+                    error_control.accept(planned, &damage.zeta, &self.history.error, &added, &rate)
             {
-                let shorter = self.retry(planned, factor);
+                let shorter = self.retry(planned, ratio);
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
             }
             // ∫ ζ' to third order is k (f_n − ½ Δ_n − ω/(6 (1+ω)) (Δ_n − ω Δ_{n−1})), Δ_n = f_n − f_{n−1}.
-            let omega = planned.length / self.memory.length;
-            let before = omega * &self.memory.rate_change;
+            let omega = planned.length / self.history.length;
+            let before = omega * &self.history.rate_change;
             let turn = &change - &before;
             let error =
                 trapezoidal - increment - planned.length * omega / (6.0 * (1.0 + omega)) * &turn;
@@ -208,24 +208,24 @@ impl<'a> StepController<'a> {
             let jumps = of_jump * turn.abs().component_div(&(change.abs() + before.abs()));
             let doubt = planned.length * jumps.map(|jumps| DOUBT.max(jumps)).component_mul(&turn);
             self.add_error(planned.length, &error, &doubt, &corrected, &rate);
-            damage_step.diffuse(planned, &mut self.memory.error)?;
-            damage_step.diffuse(planned, &mut self.memory.doubt)?;
-            self.memory.rate_change = change;
+            damage_step.diffuse(planned, &mut self.history.error)?;
+            damage_step.diffuse(planned, &mut self.history.doubt)?;
+            self.history.rate_change = change;
         } else {
             self.add_euler_error(planned, &rate);
         }
-        self.memory.violation.observe(planned, damage.min_max, planned.time);
+        self.history.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
         let tightened = (lower.max(damage.min_max.0), upper.min(damage.min_max.1));
         let partition = &self.problem.body.vertices.partition;
-        self.memory.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
-        self.memory.length = planned.length;
-        self.memory.last_error = correction;
-        self.memory.change = &corrected - &self.memory.zeta;
-        self.memory.zeta = corrected;
-        self.memory.rate = Some(rate);
-        self.memory.load_change = &source.load - &self.memory.source.load;
-        self.memory.source = source;
+        self.history.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
+        self.history.length = planned.length;
+        self.history.last_error = correction;
+        self.history.change = &corrected - &self.history.zeta;
+        self.history.zeta = corrected;
+        self.history.rate = Some(rate);
+        self.history.load_change = &source.load - &self.history.source.load;
+        self.history.source = source;
         Ok(Decision::Accept(step))
     }
 
@@ -239,7 +239,7 @@ impl<'a> StepController<'a> {
         let (zeta_min, threshold) = (damage.min_max.0, self.problem.threshold());
         let rate = planned.rate(&damage.zeta);
         let time = if self.two_step {
-            let from = self.problem.body.vertices.partition.min_max(self.memory.zeta.as_slice()).0;
+            let from = self.problem.body.vertices.partition.min_max(self.history.zeta.as_slice()).0;
             // The fraction of the step after which ζ falls to ζ_*.
             let fraction =
                 if from > threshold { (from - threshold) / (from - zeta_min) } else { 0.0 };
@@ -257,10 +257,10 @@ impl<'a> StepController<'a> {
             self.add_euler_error(planned, &rate);
             planned.time
         };
-        self.memory.violation.observe(planned, damage.min_max, time);
+        self.history.violation.observe(planned, damage.min_max, time);
         let [error, rate, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
-        // An error δζ delays the stop by δζ/ζ′. The rate at the beginning of the step is about the mean of the rates of both
-        // steps, and the smaller one of it and of the last rate counts: ζ may fall faster and faster, or the load may pass.
+        // An error δζ delays the stop by δζ/ζ′. ζ may fall faster and faster, or the load may pass: so ζ′ is the smaller one of
+        // the last rate and of the rate at the beginning of the step, about the mean of the rates of both steps.
         let slower = rate.abs().min(0.5 * (rate + rate_before).abs());
         let delay = (error / slower).abs();
         // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
@@ -297,7 +297,7 @@ impl<'a> StepController<'a> {
     }
 
     pub(crate) fn violation(&self) -> BoundViolation {
-        self.memory.violation
+        self.history.violation
     }
 
     /// The estimated error of the last accepted ζ over the damage done, for adaptive steps.
@@ -306,9 +306,9 @@ impl<'a> StepController<'a> {
         Some(error_control.relative(&self.step_error()))
     }
 
-    /// Rejects the step for one shorter by `factor`; `None` if steps are uniform or this step would be too short.
-    fn retry(&mut self, planned: &PlannedStep, factor: f64) -> Option<Decision> {
-        let possible = self.error_control.as_mut()?.shorten(planned.length * factor);
+    /// Rejects the step for one shorter by the `ratio`; `None` if steps are uniform or this step would be too short.
+    fn retry(&mut self, planned: &PlannedStep, ratio: f64) -> Option<Decision> {
+        let possible = self.error_control.as_mut()?.shorten(planned.length * ratio);
         possible.then_some(Decision::Retry)
     }
 }

@@ -7,13 +7,13 @@ use nalgebra::DVector;
 impl StepController<'_> {
     /// The estimated error E of the last accepted ζ from the time steps, at the nodes.
     pub(crate) fn step_error(&self) -> DVector<f64> {
-        &self.memory.error + &self.memory.last_error
+        &self.history.error + &self.history.last_error
     }
 
     /// The error bar of ζ from the time steps, at the nodes: |E| + Σ|d| with the doubts d of the steps. The errors of loads
     /// that rise and fall cancel in E, their doubts do not.
     pub(crate) fn step_bar(&self) -> DVector<f64> {
-        self.step_error().abs() + &self.memory.doubt
+        self.step_error().abs() + &self.history.doubt
     }
 
     /// After the last step: adds the error of Euler's last step, which the rate of one more step shows. Collective.
@@ -21,12 +21,12 @@ impl StepController<'_> {
     /// # Errors
     /// That step has no answer.
     pub(crate) fn add_last_error(&mut self, damage_step: &mut DamageStep) -> Result<(), RunError> {
-        let length = self.memory.length;
+        let length = self.history.length;
         if self.two_step || length.is_infinite() {
             return Ok(());
         }
-        let (start, load) = (self.memory.zeta.clone(), self.memory.source.load.clone());
-        let (n, time, bounds) = (0, 0.0, self.memory.bounds);
+        let (start, load) = (self.history.zeta.clone(), self.history.source.load.clone());
+        let (n, time, bounds) = (0, 0.0, self.history.bounds);
         let planned = PlannedStep { n, time, length, k: length, start, load, bounds };
         let zeta = damage_step.solve(&planned)?.zeta;
         self.add_euler_error(&planned, &planned.rate(&zeta));
@@ -36,15 +36,15 @@ impl StepController<'_> {
     /// Adds the error of the previous Euler step; `rate` is the rate of this step: (28) takes the source at the
     /// beginning of a step, so the error is ½ k (ζ'_n − ζ'_{n−1}).
     pub(super) fn add_euler_error(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
-        if let Some(before) = &self.memory.rate {
+        if let Some(before) = &self.history.rate {
             let error = 0.5 * planned.k * (rate - before);
-            let (zeta, mean) = (self.memory.zeta.clone(), 0.5 * (rate + before));
+            let (zeta, mean) = (self.history.zeta.clone(), 0.5 * (rate + before));
             self.add_error(planned.length, &error, &error, &zeta, &mean);
         }
     }
 
     /// Adds the `error` of a step of `length` s to `zeta` with the mean `rate`, and its `doubt`. Earlier errors grow by
-    /// the smaller one of two factors:
+    /// the smaller one of two ratios:
     ///
     /// - exp(∫g), with g from [`error_growth`](crate::model::DamageSource::error_growth) of the damage source, by the trapezoidal
     ///   rule, for strains proportional to 1/ζ. Prescribed displacements prevent such strains.
@@ -57,7 +57,7 @@ impl StepController<'_> {
         zeta: &DVector<f64>,
         rate: &DVector<f64>,
     ) {
-        if let (Some(laws), Some(before)) = (self.problem.damage(), &self.memory.rate) {
+        if let (Some(laws), Some(before)) = (self.problem.damage(), &self.history.rate) {
             // A node may belong to several materials.
             let growth = |zeta: f64, rate: f64| {
                 let of_laws =
@@ -65,17 +65,17 @@ impl StepController<'_> {
                 of_laws.fold(0.0, maximum)
             };
             for i in (0..zeta.len()).filter(|&i| before[i] < 0.0 || rate[i] < 0.0) {
-                let start = growth(self.memory.zeta[i], before[i]);
-                let mut factor = (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
+                let start = growth(self.history.zeta[i], before[i]);
+                let mut ratio = (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
                 if before[i] < 0.0 {
-                    factor = -maximum(-factor, -(rate[i] / before[i]).max(1.0));
+                    ratio = -maximum(-ratio, -(rate[i] / before[i]).max(1.0));
                 }
-                self.memory.error[i] *= factor;
-                self.memory.doubt[i] *= factor;
+                self.history.error[i] *= ratio;
+                self.history.doubt[i] *= ratio;
             }
         }
-        self.memory.error += error;
-        self.memory.doubt += doubt.abs();
+        self.history.error += error;
+        self.history.doubt += doubt.abs();
     }
 
     /// At the node of minimum `zeta`: its error bar, and ζ′ in this step (`rate`) and in the one before, 1/s. Collective.
@@ -83,7 +83,7 @@ impl StepController<'_> {
         let partition = &self.problem.body.vertices.partition;
         let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
         let (_, rank) = partition.comm().min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
-        let before = self.memory.rate.as_ref().unwrap_or(rate);
+        let before = self.history.rate.as_ref().unwrap_or(rate);
         let bar = self.step_bar();
         let values = weakest.map_or([0.0; 3], |i| [bar[i], rate[i], before[i]]);
         values.map(|value| partition.comm().broadcast(rank, value))

@@ -4,13 +4,11 @@
 use super::LinearSolver;
 use crate::{
     linear::{
-        Factor, LinearSystem, Precision,
-        factor::VERY_LARGE,
-        linear_system::{FACTORISATION, PRESCRIPTION, TRIANGULAR_SOLVES},
+        Factor, LinearSystem, Precision, factor::VERY_LARGE, linear_system::TRIANGULAR_SOLVES,
     },
     petsc::{
         Communicator, Matrix, Pattern, PetscError, Session, ShellPreconditioner, Vector,
-        has_option, set_default_option,
+        has_option, set_default_option, stage,
     },
 };
 use std::iter;
@@ -139,7 +137,7 @@ impl LinearSolver {
     /// # Errors
     /// PETSc or CHOLMOD failed.
     pub fn factorise(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
-        system.timed(FACTORISATION, 1.0, || self.set_up(system))
+        stage("factorisation", || self.set_up(system))
     }
 
     fn set_up(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
@@ -177,7 +175,8 @@ impl LinearSolver {
     /// Is there a preconditioner for the system? Prescribes the unknowns of the system in a condensed factor.
     pub(super) fn is_ready(&mut self, system: LinearSystem) -> Result<bool, PetscError> {
         let prescribe = || self.prescribe(system.prescribed.unwrap_or(&[]));
-        system.timed(PRESCRIPTION, 1.0, prescribe)
+        // A change of the prescribed unknowns in a condensed factor.
+        stage("Schur complement", prescribe)
     }
 
     /// Makes the preconditioner of a checkpoint again.
@@ -212,7 +211,6 @@ pub(super) struct TimedFactor<'a> {
     /// P⁻¹ r of the first residual, if it is known, and this residual, if the KSP may begin with another vector.
     pub(super) first: Option<&'a Vector>,
     pub(super) of: Option<&'a Vector>,
-    pub(super) system: LinearSystem<'a>,
 }
 
 impl ShellPreconditioner for TimedFactor<'_> {
@@ -227,7 +225,7 @@ impl ShellPreconditioner for TimedFactor<'_> {
         {
             return z.axpby(1.0, first, 0.0);
         }
-        self.system.timed(TRIANGULAR_SOLVES, 1.0, || self.factor.apply(r, z))
+        stage(TRIANGULAR_SOLVES, || self.factor.apply(r, z))
     }
 }
 

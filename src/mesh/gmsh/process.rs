@@ -137,7 +137,7 @@ fn wait(mut gmsh: Child, squares: &Path, input: &Path) -> Result<ExitStatus, Mes
     let (started, _interrupts) = (Instant::now(), Interrupts::defer());
     let limit = env::var(SECONDS_VARIABLE).ok().and_then(|text| text.parse().ok());
     let limit = limit.unwrap_or(SECONDS);
-    let mut told = false;
+    let mut is_noted = false;
     loop {
         if let Some(status) = gmsh.try_wait().map_err(MeshError::io(Path::new("gmsh")))? {
             return Ok(status);
@@ -146,7 +146,7 @@ fn wait(mut gmsh: Child, squares: &Path, input: &Path) -> Result<ExitStatus, Mes
             let squares: f64 = fs::read_to_string(squares).ok()?.trim().parse().ok()?;
             Some(TRIANGLES_PER_SQUARE * squares).filter(|triangles| *triangles >= 1.0)
         };
-        if !told
+        if !is_noted
             && (started.elapsed() > NOTE_AFTER || triangles().is_some_and(|all| all > ANNOUNCED))
         {
             let of =
@@ -158,7 +158,7 @@ fn wait(mut gmsh: Child, squares: &Path, input: &Path) -> Result<ExitStatus, Mes
                      .step in mm)"
                 ),
             );
-            told = true;
+            is_noted = true;
         }
         let late = started.elapsed().as_secs_f64() > limit;
         let signal = received();

@@ -65,7 +65,7 @@ impl Matrix {
         self.shell.iter().for_each(|shell| shell.stale.set(true));
     }
 
-    /// What has PETSc multiply by this matrix.
+    /// PETSc's handle for products: that of the operator, or that of the stored entries.
     pub(in crate::petsc) fn product(&self) -> raw::Mat {
         self.shell.as_ref().map_or(self.stored(), |shell| shell.handle.raw())
     }

@@ -72,7 +72,7 @@ enum Governing {
     LargestModulus,
 }
 
-/// What a figure describes.
+/// The part of the problem that a figure describes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Of {
     /// The whole body, or all of Γ_C.
@@ -198,9 +198,7 @@ impl Figures {
         use Governing::{Largest, LargestModulus, Least};
         let (mut all, body) = (Self::default(), Of::Body);
         all.add(&body, [("zeta_min", "least ζ", Zeta, Least)], |of, _| of.zeta_min);
-        all.add(&body, [("zeta_mean", "mean ζ", OfZeta, Least)], |of, _| {
-            of.problem.body.mean(&of.state.zeta).into()
-        });
+        all.add(&body, [("zeta_mean", "mean ζ", OfZeta, Least)], |of, _| of.zeta_mean.into());
         let most = ("displacement_max", "largest displacement", Length, Largest);
         all.add(&body, [most], |of, _| of.displacement_max);
         let work = ("work", "work of the loads", Work, LargestModulus);

@@ -1,4 +1,4 @@
-//! What the figures of a state are read from.
+//! The sums and extremes from which the figures of a state are taken.
 
 use super::{SHOWN_AS_ZERO, Value};
 use crate::{
@@ -8,14 +8,14 @@ use crate::{
         Strained, rows_of,
     },
 };
-/// The quantities from which figures take their values. The state is that of this rank; all other quantities are sums or extremes
-/// over the ranks.
-pub(crate) struct Observation<'a> {
-    pub problem: &'a DiscreteProblem,
-    /// A figure that is computed from the state must add up the ranks.
-    pub state: &'a State,
+
+/// The quantities from which figures take their values. All are sums or extremes over the
+/// ranks.
+pub(crate) struct Observation {
     /// min ζ.
     pub zeta_min: Value,
+    /// ∫ζ / |Ω|.
+    pub zeta_mean: f64,
     /// Maximum nodal |u|, m.
     pub displacement_max: Value,
     /// fᵀu, of the loads alone, J per metre of thickness.
@@ -25,7 +25,7 @@ pub(crate) struct Observation<'a> {
     /// The largest von Mises stress, the largest σ₁ and the smallest σ₂, Pa: first those of the body, then those of each
     /// material if there are several.
     pub stresses: Vec<[Value; 3]>,
-    /// What the stresses are made from. The strains are zero if the body only moves rigidly.
+    /// The strains and ζ of the stresses. The strains are zero if the body only moves rigidly.
     pub strained: Strained,
     /// The figures of Γ_C, then those of each foundation.
     pub contact: Vec<ContactFigures>,
@@ -43,13 +43,13 @@ impl DiscreteProblem {
     ///
     /// # Errors
     /// PETSc failed.
-    pub(crate) fn observe<'a>(
-        &'a self,
-        state: &'a State,
+    pub(crate) fn observe(
+        &self,
+        state: &State,
         load: &[f64],
         unbalanced: &[f64],
         rounding: f64,
-    ) -> Result<(Observation<'a>, Vec<Value>), PetscError> {
+    ) -> Result<(Observation, Vec<Value>), PetscError> {
         let seen = Observation::new(self, state, load, unbalanced)?;
         let displacement = SHOWN_AS_ZERO * seen.displacement_max.value;
         let values = self.without_rounding(self.figures.values(&seen), (rounding, displacement));
@@ -57,14 +57,14 @@ impl DiscreteProblem {
     }
 }
 
-impl<'a> Observation<'a> {
+impl Observation {
     /// The observation of a state with the nodal loads `load` and the residual forces `unbalanced` = f − Ku. Collective.
     ///
     /// # Errors
     /// PETSc failed.
     pub(crate) fn new(
-        problem: &'a DiscreteProblem,
-        state: &'a State,
+        problem: &DiscreteProblem,
+        state: &State,
         load: &[f64],
         unbalanced: &[f64],
     ) -> Result<Self, PetscError> {
@@ -86,9 +86,8 @@ impl<'a> Observation<'a> {
         let strained = NodalStress::strained(problem, &problem.strained(state));
         let active = state.of_contact().filter(|point| point.active);
         Ok(Self {
-            problem,
-            state,
             zeta_min: Value { value: -least.value, ..least },
+            zeta_mean: body.mean(&state.zeta),
             displacement_max: Value { value: farthest.value.sqrt(), ..farthest },
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.

@@ -191,9 +191,9 @@ fn twice_differentiable(secants: &[[f64; 2]]) -> Vec<f64> {
     rows.push([last[0][0] + last[1][0], last[1][0], 0.0, right(last[0], last[1])]);
     for i in 1..rows.len() {
         let ([_, diagonal, above, r], below) = (rows[i - 1], rows[i][0]);
-        let factor = below / diagonal;
-        rows[i][1] -= factor * above;
-        rows[i][3] -= factor * r;
+        let ratio = below / diagonal;
+        rows[i][1] -= ratio * above;
+        rows[i][3] -= ratio * r;
     }
     let mut slopes = vec![0.0; rows.len() + 1];
     for (i, [_, diagonal, above, r]) in rows.into_iter().enumerate().rev() {

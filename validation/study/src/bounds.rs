@@ -4,10 +4,10 @@ use crate::StudyError;
 use serde::Serialize;
 use signorini::{
     estimate::Simulation,
-    evolution::{Choices, ContactStep, Phases, Step},
+    evolution::{Choices, ContactStep, Step},
     fem::{Body, Location},
     mesh::{self, Order, Refinement},
-    petsc::Session,
+    petsc::{Session, stage_seconds},
     problem::DiscreteProblem,
     scene::Scene,
 };
@@ -42,7 +42,6 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
     let coarse = mesh::load(&scene.mesh.file, &scene.mesh.parameters, scene.order)?;
     let coarse = Refinement::start(coarse).mesh;
     let problem = DiscreteProblem::new(scene.clone(), coarse.clone())?;
-    let phases = Phases::default();
     let mut most: Option<Step> = None;
     let mut observer = |step: &Step| {
         let of = |step: &Step| step.record.displacement_max;
@@ -51,7 +50,7 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
         }
         Ok(())
     };
-    let run = Simulation::new(&problem).phases(&phases).observer(&mut observer);
+    let run = Simulation::new(&problem).bound().observer(&mut observer);
     let outcome = run.run(session)?;
     // The proof takes the state with the largest displacement if the last one is unloaded.
     let most = most.as_ref().unwrap_or(&outcome.last);
@@ -71,18 +70,14 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
     let mut fine = scene;
     fine.order = Order::Quadratic;
     let fine = DiscreteProblem::new(fine, finer.mesh)?;
-    let (choices, ignored) = (Choices::of(fine.scene()), Phases::default());
-    let exact =
-        ContactStep::new(session, &fine, &choices, &ignored)?.solve(0, state.time, &zeta)?;
+    let choices = Choices::of(fine.scene());
+    let seconds = stage_seconds();
+    let exact = ContactStep::new(session, &fine, &choices)?.solve(0, state.time, &zeta)?;
     let own = interpolated(body, &state.u, &fine.body, &parents);
     let error: Vec<f64> = exact.state.u.iter().zip(&own).map(|(u, own)| u - own).collect();
     let energy = |problem: &DiscreteProblem, zeta: &[f64], u: &[f64]| {
         let zeta = problem.zeta_at_points(zeta);
         problem.elasticity.energies(&problem.body, &zeta, u).iter().sum::<f64>()
-    };
-    let of_run = |name: &str| {
-        let part = phases.parts("").into_iter().find(|(known, _)| *known == name);
-        part.map_or(0.0, |(_, part)| part.seconds)
     };
     Ok(Errors {
         triangles: body.triangles.len(),
@@ -90,7 +85,7 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
         reservations: outcome.errors.reservations,
         estimate: outcome.errors.displacement_mesh,
         truth: (energy(&fine, &zeta, &error) / energy(&problem, &state.zeta, &state.u)).sqrt(),
-        seconds: [of_run("proof"), outcome.last.record.seconds],
+        seconds: [seconds["proof"], outcome.last.record.seconds],
     })
 }
 

@@ -3,9 +3,7 @@
 use crate::StudyError;
 use signorini::{
     estimate::Simulation,
-    evolution::{
-        Choices, ContactStep, DiscreteProblem, Outcome, Phases, RunError, SetupError, Step,
-    },
+    evolution::{Choices, ContactStep, DiscreteProblem, Outcome, RunError, SetupError, Step},
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -78,8 +76,7 @@ pub fn solve(
     solver: &str,
     guess: Option<&[f64]>,
 ) -> Result<Result<Step, RunError>, StudyError> {
-    let phases = Phases::default();
-    let mut contact_step = ContactStep::new(session, problem, &Choices::named(solver), &phases)?;
+    let mut contact_step = ContactStep::new(session, problem, &Choices::named(solver))?;
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""Draws the figures of one or more runs into their result folders.
+"""Draws pictures of one or more runs into their result folders.
 
-    signorini figures out/lshape out/bridge
+    signorini plot out/lshape out/bridge
 
 setting        the body, its boundaries by name, loads and supports (paper, Figures 2, 4, 7)
 deformed       the deformed mesh over the initial outline (Figures 5 and 8)
@@ -42,7 +42,7 @@ from setting import draw_setting
 from signorini_files import check, whole
 from signorini_summaries import folders_of
 
-FIGURES = {
+PICTURES = {
     "setting": draw_setting,
     "deformed": draw_deformed,
     "stress-damage": draw_stress_and_damage,
@@ -51,7 +51,7 @@ FIGURES = {
     "damage-history": draw_damage_history,
     "force-displacement": draw_force_displacement,
 }
-# Figures of the whole run, for all times.
+# Pictures of the whole run, for all times.
 OF_ALL_TIMES = ("damage-history", "force-displacement")
 # The file formats of pictures.
 FORMATS = ("png", "svg", "pdf")
@@ -80,8 +80,8 @@ def arguments_of(prog):
     parser.add_argument("--times", type=numbers(None), metavar="T,…", help=(
         "times of the curves, s (default: the last frame)"))
     parser.add_argument("--no-title", action="store_true", help="without titles, for papers")
-    parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every figure")
-    parser.add_argument("--only", type=lambda text: text.split(","), default=list(FIGURES), metavar="NAME,…", help=(
+    parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every picture")
+    parser.add_argument("--only", type=lambda text: text.split(","), default=list(PICTURES), metavar="NAME,…", help=(
         "only these pictures, by the names above"))
     parser.add_argument("--together", action="store_true", help=(
         "only force-displacement-together, the forces of all runs in one picture, into the first folder"))
@@ -102,8 +102,8 @@ def arguments_of(prog):
     arguments = parser.parse_args()
     if unknown := set(arguments.format) - set(FORMATS):
         parser.error(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
-    if unknown := set(arguments.only) - set(FIGURES):
-        parser.error(f"--only: {', '.join(sorted(unknown))} is none of {', '.join(FIGURES)}")
+    if unknown := set(arguments.only) - set(PICTURES):
+        parser.error(f"--only: {', '.join(sorted(unknown))} is none of {', '.join(PICTURES)}")
     if arguments.line and arguments.along:
         parser.error("--line and --along: give one of them")
     if (arguments.times or arguments.quantity) and not (arguments.line or arguments.along):
@@ -154,7 +154,7 @@ def save(figure, results, name, formats):
 
 
 def draw(results, limits, arguments):
-    """Draws the figures of one run."""
+    """Draws the pictures of one run."""
     if arguments.paraview:
         # The scales suit all frames.
         chosen = states(results, evenly(results.frames, FRAMES))
@@ -162,7 +162,7 @@ def draw(results, limits, arguments):
         return
     last = replace(results, time=results.frames[-1][0])
     for name in arguments.only:
-        save(FIGURES[name](results, limits), last if name in OF_ALL_TIMES else results, name, arguments.format)
+        save(PICTURES[name](results, limits), last if name in OF_ALL_TIMES else results, name, arguments.format)
     if arguments.mesh:
         save(draw_mesh(results), last, "mesh", arguments.format)
     if arguments.evolution:
@@ -175,7 +175,7 @@ def draw(results, limits, arguments):
 
 
 def main(prog=None):
-    """Returns the exit code: 2 if a figure could not be drawn. A message names it."""
+    """Returns the exit code: 2 if a picture could not be drawn. A message names it."""
     arguments = arguments_of(prog)
     drawing.use(width=arguments.width, titles=not arguments.no_title, contours=arguments.contours,
                 abscissa=arguments.abscissa, range=arguments.range)

@@ -1,14 +1,14 @@
-//! Figures and reports, where there is a Python that draws them.
+//! Pictures and reports, where there is a Python that draws them.
 
 use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, sets, square};
 use std::{fs::File, process::Command};
 
 #[test]
-fn figures_and_a_report_are_drawn_far_from_the_scripts() {
+fn pictures_and_a_report_are_drawn_far_from_the_scripts() {
     let test_directory = TestDirectory::new();
     test_directory.run(&["--set", "output.every=5"]);
     let Some(drawn) =
-        test_directory.say_python(&["figures", "out/scene", "--time", "0.45", "--format", "svg"])
+        test_directory.say_python(&["plot", "out/scene", "--time", "0.45", "--format", "svg"])
     else {
         return;
     };
@@ -16,7 +16,14 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     for picture in ["setting_t0.5.svg", "deformed_t0.5.svg", "pressure_t0.5.svg"] {
         assert!(test_directory.read(&format!("out/scene/{picture}")).contains("<svg"), "{picture}");
     }
-    assert_eq!(test_directory.say(&["figures", "nothing"]).code, Some(2));
+    assert_eq!(test_directory.say(&["plot", "nothing"]).code, Some(2));
+    // The old name of the command.
+    let old = test_directory.say(&["figures", "out/scene", "--only", "setting"]);
+    assert_eq!(old.code, Some(0), "{old:?}");
+    assert!(
+        old.err.contains("is now `signorini plot`") && old.out.contains("setting.png"),
+        "{old:?}"
+    );
 
     assert_eq!(test_directory.say(&["report", "out/scene", "--pdf"]).code, Some(0));
     let pdf = std::fs::read(test_directory.path("out/scene/report.pdf")).expect("a PDF");
@@ -38,7 +45,7 @@ fn figures_and_a_report_are_drawn_far_from_the_scripts() {
     let frame = format!("out/scene/{last}");
     test_directory.write(&frame, &test_directory.read(&frame)[..999]);
     let cut = format!("{frame}: it is damaged or cut off");
-    test_directory.say(&["figures", "out/scene"]).fails(2, &[&cut]);
+    test_directory.say(&["plot", "out/scene"]).fails(2, &[&cut]);
 }
 
 /// Without a folder for temporary files, without the packages, or where nothing can be written, every command that
@@ -53,14 +60,14 @@ fn commands_of_python_in_odd_surroundings() {
     let said = |arguments: &[&str], variable: (&str, &str)| {
         ProgramOutput::of(directory.command(arguments).env(variable.0, variable.1))
     };
-    for command in ["info", "table", "figures", "report", "study", "compare"] {
+    for command in ["info", "table", "plot", "report", "study", "compare"] {
         let absent = said(&[command, "out/scene"], ("TMPDIR", "/absent"));
         absent.fails(1, &["/absent: No such file", "set TMPDIR to another folder"]);
         let absent = said(&[command, "out/scene"], ("PYTHON", "absent"));
         absent
             .fails(2, &["Python 3.11 or newer with matplotlib and meshio", "absent No such file"]);
     }
-    directory.say(&["figures", "out/absent", "--together"]).fails(2, &["out/absent/summary.json"]);
+    directory.say(&["plot", "out/absent", "--together"]).fails(2, &["out/absent/summary.json"]);
     // No folder can be made below a file.
     for (command, more) in [("study", &["--set", "time.end=0.1"][..]), ("compare", &[])] {
         let said =
@@ -177,7 +184,7 @@ fn a_body_without_damage_is_not_told_of_damage() {
     let said = directory.run(&sets(&["time.step='auto'", "output.times=[0.5]"]));
     assert!(said.out.contains("to t = 1 in steps that follow the loads"), "{}", said.out);
     assert!(!said.out.contains('ζ'), "{}", said.out);
-    if directory.say_python(&["figures", "out/scene", "--animate"]).is_none() {
+    if directory.say_python(&["plot", "out/scene", "--animate"]).is_none() {
         return;
     }
     let names = directory.names("out/scene");
@@ -283,15 +290,15 @@ fn one_picture_and_the_forces_of_several_runs_are_drawn_alone() {
     let directory = TestDirectory::new();
     directory.run(&["--out", "out/one"]);
     directory.run(&["--out", "out/two", "--set", "material.young=160"]);
-    let words = ["figures", "out/one", "--only", "pressure"];
+    let words = ["plot", "out/one", "--only", "pressure"];
     let Some(said) = directory.say_python(&words) else { return };
     assert_eq!(said.out, "out/one/pressure.png\n");
-    let refused = directory.say(&["figures", "out/one", "--only", "pressur"]);
+    let refused = directory.say(&["plot", "out/one", "--only", "pressur"]);
     assert!(
         refused.code == Some(2) && refused.err.contains("pressur is none of setting"),
         "{refused:?}"
     );
-    let said = directory.say(&["figures", "out/one", "out/two", "--together", "--format", "svg"]);
+    let said = directory.say(&["plot", "out/one", "out/two", "--together", "--format", "svg"]);
     assert_eq!(said.out, "out/one/force-displacement-together.svg\n");
 }
 
@@ -308,7 +315,7 @@ fn curves_along_an_open_boundary_run_with_increasing_x_or_y() {
         said,
         "bottom [0.0, 0.0] [1.0, 0.0]\ntop [0.0, 1.0] [1.0, 1.0]\nleft [0.0, 0.0] [0.0, 1.0]\n"
     );
-    directory.say(&["figures", "out/scene", "--along", "top", "--format", "svg"]);
+    directory.say(&["plot", "out/scene", "--along", "top", "--format", "svg"]);
     let drawn = directory.read("out/scene/curves_along_top_von_mises.svg");
     assert!(drawn.contains("top: (0, 1) → (1, 1)"), "no direction");
 }
