@@ -193,7 +193,10 @@ handbook: build
 FUZZ_RUNS ?= 4900000
 # A scene takes twenty milliseconds.
 FUZZ_SCENES ?= $(shell expr $(FUZZ_RUNS) / 25)
-fuzz: deps
+# FILES meshes, scenes, profiles and results as files; for Nastran PYTHON needs pyNastran.
+FILES ?= 10000
+fuzz: build
+	$(PYTHON) validation/fuzz/mutate_files.py --count $(FILES) --binary $(BINARY)
 	@scripts/deps.sh g++
 	@cargo +nightly fuzz --version >/dev/null 2>&1 || \
 	    { rustup toolchain install nightly --profile minimal && cargo install --locked cargo-fuzz; } || \

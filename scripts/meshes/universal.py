@@ -89,7 +89,8 @@ def group(lines, mesh, seen):
     if name in seen:
         refuse(place, f"there is a group {name} above; give each a name of its own")
     seen.add(name)
-    words = lines.many(4 * count, 8)
+    # A line has two members; where nodes end and elements begin gmsh starts a new one.
+    words = lines.many(4 * count, 4)
     for of, label in zip(words[::4], words[1::4]):
         if of not in (7, 8):
             refuse(place, f"the group {name} has an entity of type {of}; only nodes (7) and elements (8) are read")

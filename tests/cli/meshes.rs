@@ -154,3 +154,28 @@ fn a_mesh_of_another_program_is_run_and_copied() {
     let size = ["check", "scene.toml", "--set", "mesh.size=0.1"];
     test_directory.say(&size).fails(2, &["mesh.size has no effect", "name its geometry"]);
 }
+
+#[test]
+fn a_frame_of_two_materials_is_the_mesh_of_its_run() {
+    let test_directory = TestDirectory::new();
+    let plate = include_str!("../fixtures/msh/plate-22.msh");
+    test_directory.write("plate.msh", plate);
+    let scene = |mesh: &str, surface: &str| {
+        format!(
+            "mesh = {{ file = \"{mesh}\" }}\n\
+             material = {{ young = 1e6, poisson = 0.3, plane = \"stress\", \"{surface}\" = {{ young = 2e6 }} }}\n\
+             [[boundary]]\nname = \"base\"\nwhere = \"y < 1e-6\"\ndisplacement = [0, 0]\n\
+             [[boundary]]\nname = \"head\"\nwhere = \"y > 1 - 1e-6\"\ntraction = [0, -80]\n"
+        )
+    };
+    let work = |name: &str, text: &str| {
+        test_directory.write(&format!("{name}.toml"), text);
+        let said = test_directory.say(&["run", &format!("{name}.toml"), "--out", name]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+        test_directory.summary(name)["figures"]["work"]["value"].as_f64().expect("a number")
+    };
+    let own = work("own", &scene("plate.msh", "left part"));
+    let frame = test_directory.names("own").into_iter().find(|name| name.starts_with("fields_"));
+    let of_frame = work("frame", &scene(&format!("own/{}", frame.expect("a frame")), "1"));
+    assert!((own - of_frame).abs() <= 1e-12 * own, "{own} is not {of_frame}");
+}

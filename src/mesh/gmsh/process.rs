@@ -89,10 +89,8 @@ pub fn run(
     let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
     let child = child.map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => {
-            let problem = format!(
-                "gmsh is needed to mesh it and was not found; install it with `make deps` (Debian: \
-                 apt install gmsh)"
-            );
+            let problem = "gmsh is needed to mesh it and was not found; install it with `make deps` (Debian: apt install \
+                           gmsh)";
             MeshError::file(input, problem)
         }
         _ => MeshError::io(Path::new("gmsh"))(source),
