@@ -151,3 +151,33 @@ fn an_inclined_foundation_is_met_along_its_normal() {
         }
     }
 }
+
+/// A clamped node at the end of a foundation keeps its place, and bears no contact force across the open gap there. Where the
+/// whole gap stays open, the foundation changes nothing.
+#[test]
+fn a_clamp_at_the_end_of_an_open_gap_bears_no_contact_force() {
+    let clamped = |bottom: &str| {
+        let text = format!(
+            "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
+             boundary = [
+                {{ name = 'left', displacement = [0, 0] }},
+                {{ name = 'bottom', {bottom} }},
+                {{ name = 'top', traction = [0, '-x'] }},
+             ]"
+        );
+        problem(distorted(5), &text).unwrap()
+    };
+    for solver in SOLVERS {
+        let alone = run(&clamped("traction = [0, 0]"), solver).last.state.u;
+        for (gap, closes) in [("gap = 1", false), ("gap = 1e-3", true)] {
+            let problem = clamped(gap);
+            let last = run(&problem, solver).last;
+            let clamp = problem.body.mesh.nodes.iter().position(|x| *x == [0.0, 0.0]).unwrap();
+            assert!(last.state.contact.iter().all(|point| point.node != clamp), "{solver}, {gap}");
+            let force = last.state.contact.iter().map(|point| point.force).sum();
+            close(last.record.contact_force, force, 1e-12);
+            assert_eq!(force > 0.0, closes, "{solver}, {gap}");
+            assert!(closes || difference(&last.state.u, &alone) < 1e-9, "{solver}, {gap}");
+        }
+    }
+}
