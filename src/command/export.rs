@@ -33,7 +33,7 @@ pub struct ExportArguments {
 }
 
 /// All files that an export may have.
-const FILES: [&str; 16] = [
+const EXPORTED: [&str; 16] = [
     "K.mtx",
     "A.mtx",
     "B.mtx",
@@ -82,7 +82,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let ExportArguments { scene, time, out } = arguments;
     let earlier = earlier(out);
     let is_own = |name: &str| earlier.iter().any(|known| known == name);
-    FILES
+    EXPORTED
         .iter()
         .try_for_each(|name| check_is_own(&out.join(name), || is_own(name)))
         .map_err(Failure::input)?;
@@ -118,7 +118,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     create(out).map_err(Failure::input)?;
     // An earlier export may have files that this one has not.
     let is_new = |name: &str| files.iter().any(|(new, _)| *new == name);
-    let stale = FILES.iter().filter(|name| is_own(name) && !is_new(name));
+    let stale = EXPORTED.iter().filter(|name| is_own(name) && !is_new(name));
     stale.for_each(|name| drop(fs::remove_file(out.join(name))));
     files.iter().try_for_each(|(name, text)| write_whole(&out.join(name), text.as_bytes()))?;
     let end = rounded(states[0].time);

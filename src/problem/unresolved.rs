@@ -20,7 +20,7 @@ use std::{
 /// The fraction of the accuracy that the interpolation of the initial damage may take.
 const INTERPOLATION_SHARE: f64 = 0.5;
 /// Number of steps in which the missed initial damage diffuses. With more steps less of it is left.
-const STEPS: usize = 8;
+const DIFFUSION_STEPS: usize = 8;
 /// An edge shorter than this fraction of its curve is not halved: the displacement must jump there.
 const SHORTEST: f64 = 1e-4;
 /// Maximum number of triangle parts added for the integrals of the initial damage.
@@ -179,7 +179,7 @@ impl MissedDamage {
         let (body, diffusions) = (&problem.body, problem.diffusions());
         let (vertices, whole) = (&body.vertices, self.squares.iter().sum());
         let (comm, owned) = (vertices.partition.comm(), vertices.partition.owned());
-        let k = state.time / STEPS as f64;
+        let k = state.time / DIFFUSION_STEPS as f64;
         if diffusions.is_empty() || k <= 0.0 {
             return Ok(whole);
         }
@@ -191,7 +191,7 @@ impl MissedDamage {
         let mut system = DamageSystem::new(session, body, problem.mass(), &diffusions, k)?;
         system.factorise()?;
         let Some(mut shown) = system.correction(&load)? else { return Ok(whole) };
-        for _ in 1..STEPS {
+        for _ in 1..DIFFUSION_STEPS {
             if !system.advance(&vec![0.0; owned], &mut shown)? {
                 return Ok(whole);
             }

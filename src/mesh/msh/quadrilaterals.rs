@@ -10,7 +10,7 @@ use rustc_hash::{FxHashMap as HashMap, FxHashSet as HashSet};
 use std::mem::take;
 
 /// The distance of the middle of a straight side from the mean of its ends, over its length. Files have few digits.
-const STRAIGHT: f64 = 1e-5;
+const STRAIGHT_SIDE: f64 = 1e-5;
 
 /// Divides the quadrilaterals of a file along their shorter diagonals. The longer one is taken where the shorter one
 /// leaves the quadrilateral. A quadrilateral with a corner twice is a triangle.
@@ -46,7 +46,7 @@ pub fn divide(contents: &mut Contents) -> Result<()> {
                 middles.iter().flatten().map(|&node| place(node)).collect();
             let (p, q) = ([a, b, c, d], [b, c, d, a]);
             let is_straight = |i: usize| {
-                distance(middles[i], midpoint(p[i], q[i])) <= STRAIGHT * distance(p[i], q[i])
+                distance(middles[i], midpoint(p[i], q[i])) <= STRAIGHT_SIDE * distance(p[i], q[i])
             };
             let sum = |points: &[[f64; 2]], k: usize| points.iter().map(|at| at[k]).sum::<f64>();
             let is_curved = (0..middles.len()).any(|i| !is_straight(i));
