@@ -146,7 +146,7 @@ fn a_mesh_of_another_program_is_run_and_copied() {
     test_directory.write("scene.toml", &selecting("part.inp"));
     let said = test_directory.say(&["run", "scene.toml"]);
     assert_eq!(said.code, Some(0), "{said:?}");
-    assert!(said.err.contains("its 1 quadrilaterals are cut"), "{said:?}");
+    assert!(said.out.contains("its 1 quadrilaterals are cut"), "{said:?}");
     let again =
         test_directory.say(&["run", "out/scene/scene.toml", "--out", "again", "--accuracy", "0.2"]);
     assert_eq!(again.code, Some(0), "{again:?}");

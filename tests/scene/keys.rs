@@ -62,8 +62,15 @@ fn with(path: &str, value: Option<&str>) -> Result<Scene, String> {
         let scene = Scene::parse(BASE, Path::new("base.toml"), &[set]);
         return scene.map_err(|error| error.to_string());
     }
+    // Only a mesh with arrays has this key, and only geometries have the others.
+    let base = match path {
+        "mesh.materials" => {
+            BASE.replace("\"base.geo\"\nsize = 0.25\nparameters = { grading = 3 }", "\"base.vtu\"")
+        }
+        _ => BASE.to_owned(),
+    };
     let read = |path: &Vec<&str>| {
-        let mut scene: toml::Table = BASE.parse().expect("TOML");
+        let mut scene: toml::Table = base.parse().expect("TOML");
         let mut sets = Vec::new();
         if path[..] == ["time", "tolerance"] {
             sets.push("time.step='auto'".to_owned());
