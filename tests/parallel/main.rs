@@ -207,14 +207,6 @@ fn the_bridge_that_may_slide() {
     same_on_ranks("bridge", "penalty-duality", 2, &keys);
 }
 
-/// Some of six ranks have no node of a square of two or four triangles, and no triangle.
-#[test]
-fn more_ranks_than_nodes() {
-    for order in ["discretisation.displacement=1", "discretisation.displacement=2"] {
-        same_on_ranks("square-mild", SOLVERS[0], 6, &["mesh.size=1", "time.step=0.5", order]);
-    }
-}
-
 #[test]
 fn the_disc() {
     same_on_ranks("hertz", "tao", 4, &["mesh.size=0.008"]);
