@@ -46,6 +46,7 @@ pub(super) struct Attempt {
 }
 
 /// The decision after an attempt.
+#[expect(clippy::large_enum_variant, reason = "one at a time lives, in a loop of few turns")]
 pub(super) enum Decision {
     /// The answer is accepted.
     Accept(Attempt, Candidate),
