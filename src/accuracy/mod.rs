@@ -2,16 +2,16 @@
 //!
 //! The loop is that of the field (Dörfler, SIAM J. Numer. Anal. 33, 1996):
 //!
-//! - SOLVE: a run with few time steps on the mesh ([`FewStepRun`]), which leaves an [`Answer`].
+//! - SOLVE: a run with few time steps on the mesh (`FewStepRun`), which leaves an `Answer`.
 //! - ESTIMATE: the error of u per triangle, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), with
-//!   the recovered strains ε* ([`Estimate`]). An estimate misses details finer than the mesh. So a [`Measurement`] follows once
+//!   the recovered strains ε* (`Estimate`). An estimate misses details finer than the mesh. So a `Measurement` follows once
 //!   the estimates are small: the same steps on the mesh bisected everywhere. The sequence of answers gives the error bars
-//!   of the figures ([`Sequence`]).
+//!   of the figures (`Sequence`).
 //! - MARK: the factors for the sizes of the triangles (`marking`, `sizes`).
 //! - REFINE: bisection down to these sizes.
 //!
-//! The loop ends for one reason ([`End`]). The run that is written is its last rung: it takes the mesh and the steps of the
-//! loop, and is repeated once with shorter steps if its own steps take too much of the accuracy ([`LoopState::shortened`]).
+//! The loop ends for one reason (`End`). The run that is written is its last rung: it takes the mesh and the steps of the
+//! loop, and is repeated once with shorter steps if its own steps take too much of the accuracy ([`LoopState::repeat`]).
 //! Error bars of a given mesh (`--bars`) are the loop with a fixed mesh ([`measured_errors`]).
 //!
 //! - In: a scene and a mesh of its body. With an accuracy this mesh is coarse ([`first_mesh`]).
