@@ -32,6 +32,16 @@ class _Functions(ast.NodeTransformer):
         return ast.fix_missing_locations(ast.copy_location(first, node))
 
 
+class _Powers(ast.NodeTransformer):
+    """Powers of numbers have floating point: those of whole numbers would grow until memory ends."""
+
+    def visit_BinOp(self, node):
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Pow) and isinstance(node.left, ast.Constant):
+            node.left = ast.copy_location(ast.Constant(float(node.left.value)), node.left)
+        return node
+
+
 class Expression:
     """A formula in x, y, t, evaluated in whatever arithmetic the names are bound to.
 
@@ -43,7 +53,7 @@ class Expression:
         try:
             # In Python the power is **, and `if` is not a function.
             text = re.sub(r"\bif\s*\(", "if_(", self.text.strip().replace("^", "**"))
-            tree = _Functions().visit(ast.parse(text, mode="eval"))
+            tree = _Powers().visit(_Functions().visit(ast.parse(text, mode="eval")))
             names = {*NUMPY_FUNCTIONS, "x", "y", "t", *(["table", "spline", "pchip"] if folder else [])}
             for node in ast.walk(tree):
                 if not isinstance(node, ALLOWED):

@@ -35,7 +35,7 @@ import meshio
 import numpy as np
 
 from signorini_files import whole
-from signorini_summaries import COLUMNS, read_summary, rows_of, summary_of, unknown
+from signorini_summaries import read_summary, rows_of, summary_of, unknown
 
 # Names of components: the array of a frame, and the column in it.
 COMPONENTS = {
