@@ -11,7 +11,7 @@ from meshes.abaqus_keywords import CHANGING, HARMLESS, NOTED, READ
 from meshes.description import PLANE, Mesh, real, refuse, whole
 
 # The types of faces: plane elements, with sides S1 to S4, and shells, with sides E1 to E4 in Abaqus and S3 to S6 in CalculiX.
-PLANES = re.compile(r"(?:CPEG?|CPS|CAX|DC2D|AC2D)(\d)")
+PLANES = re.compile(r"(?:CPEG?|CPS|CAX|DC2D|AC2D)(\d)(?!\d)")
 SHELLS = re.compile(r"(?:M3D|DS|S|R3D|SFM3D|STRI)(\d)")
 LINES = re.compile(r"(?:[TF][23]D|R2D)(\d)|(?:B|PIPE)[23]([123])")
 POINTS = re.compile("MASS|ROTARYI|SPRING|DASHPOT|CONN[23]D|GAP|HEATCAP")
@@ -39,8 +39,8 @@ class Block:
 
     def __init__(self, line, place):
         words = [part.partition("=") for part in line.split(",")]
-        self.place, self.name = place, words[0][0].replace(" ", "").upper().lstrip("*")
-        self.options = {name.replace(" ", "").upper(): value.strip().strip('"') for name, _, value in words[1:] if name.strip()}
+        self.place, self.name = place, "".join(words[0][0].split()).upper().lstrip("*")
+        self.options = {"".join(name.split()).upper(): value.strip().strip('"') for name, _, value in words[1:] if name.strip()}
         listed = (*READ, *NOTED, *HARMLESS)
         if self.name in CHANGING:
             refuse(place, f"*{self.name} may make, move or take away nodes or elements and is not read; write the whole mesh")

@@ -66,6 +66,12 @@ def curves_of(mesh, faces):
         ends = set(labels)
         edges = [side for side in outer if ends.issuperset(side[:2])]
         name_edges(name, edges, "nodes" if edges else f"{len(ends)} node{'s' * (len(ends) != 1)} of the body")
+        joined = {end for edge in edges for end in edge}
+        left = [end for end in dict.fromkeys(of for side in outer for of in side[:2]) if end in ends - joined]
+        if edges and left:
+            x, y = mesh.nodes[left[0]].at[:2]
+            mesh.notes.append(f"{len(left)} nodes of the set {name} on the boundary, as that at ({x:g}, {y:g}), are joined to no other one of it "
+                              "by an edge, and are not read")
     if lost := [of for of in lost if of.partition(" (")[0] not in named]:
         mesh.notes.append(f"no edge of the boundary is in the sets {', '.join(dict.fromkeys(lost))}")
     curves = defaultdict(set)

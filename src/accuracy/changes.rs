@@ -2,6 +2,7 @@
 
 use super::{Answer, FewStepRun, sizes::areas};
 use crate::{
+    ROUNDING,
     fem::Triangle,
     mesh::{Mesh, Refinement},
 };
@@ -27,6 +28,8 @@ pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec
     for ((nodes, &parent), area) in parts {
         for &node in nodes {
             let change = fine.zeta[node] - before[node];
+            // Rounding, where there is no damage, is no error.
+            let change = if change.abs() <= ROUNDING { 0.0 } else { change };
             shares[parent] += area * change * change;
             done += area * (1.0 - fine.zeta[node]).powi(2);
             largest[parent] = largest[parent].max(change.abs());

@@ -86,10 +86,14 @@ impl Partition {
         Ok(owned)
     }
 
-    /// ‖·‖₂ of a field with `block` components over the undivided body. Collective.
+    /// ‖·‖₂ of a field with `block` components over the undivided body; max |·| if no squares can be held. Collective.
     pub fn norm(&self, field: &[f64], block: usize) -> f64 {
-        let squares = field[..self.owned * block].iter().map(|v| v * v).sum::<f64>();
-        self.comm.total(squares).sqrt()
+        let own = &field[..self.owned * block];
+        let norm = self.comm.total(own.iter().map(|v| v * v).sum::<f64>()).sqrt();
+        match norm {
+            0.0 => self.comm.max(own.iter().fold(0.0, |max, v| maximum(max, v.abs()))),
+            norm => norm,
+        }
     }
 
     /// Inner product of two fields with `block` components over the undivided body. Collective.

@@ -72,6 +72,13 @@ impl DamageSource for ChosenSource {
             Self::Own(source) => source.error_growth(law, zeta, rate),
         }
     }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Fremond => Fremond.name(),
+            Self::Own(source) => source.name(),
+        }
+    }
 }
 
 /// The constants of equation (3), and the source φ of Frémond that the paper takes.
