@@ -64,14 +64,14 @@ def program(name):
     return main
 
 
-for number in SIGNALS:
-    # `nohup` lets SIGHUP be ignored. SIGINT is ignored up to here.
-    if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
-        signal.signal(number, stop)
-sys.stdout, sys.stderr = printable(sys.stdout, "surrogateescape"), printable(sys.stderr, "backslashreplace")
-sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
 name = sys.argv.pop(1)
 try:
+    for number in SIGNALS:
+        # `nohup` lets SIGHUP be ignored. SIGINT is ignored up to here.
+        if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, stop)
+    sys.stdout, sys.stderr = printable(sys.stdout, "surrogateescape"), printable(sys.stderr, "backslashreplace")
+    sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
     code = program(name)(f"signorini {name}")
     sys.stdout.flush()
 except KeyboardInterrupt as stopped:

@@ -38,11 +38,10 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, RunError, State, Step, StepFailure, StepRecord, agreed,
-    extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, Outcome, RunError, State, Step, StepFailure, StepRecord,
+    agreed, extrapolation::Extrapolation,
 };
 use crate::{
-    ROUNDING,
     contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
@@ -227,7 +226,6 @@ impl<'a> ContactStep<'a> {
             // The chosen solver cannot use the rescuer's warm start in the next step.
             next.warm_start.clear();
         }
-        self.check_scales(&candidate).map_err(|source| RunError::Step { step, time, source })?;
         let Candidate { u, kkt, scales, force, unbalanced, mut contact, prescribed, .. } =
             candidate;
         next.scales = scales;
@@ -266,15 +264,17 @@ impl<'a> ContactStep<'a> {
         })
     }
 
-    /// Checks that forces and displacements have squares. If these underflow, zero residuals prove nothing.
-    fn check_scales(&self, candidate: &Candidate) -> Result<(), StepFailure> {
-        let Scales { force, displacement } = candidate.scales;
-        let force = force.max(self.problem.largest_load);
-        let has_squares = [force, displacement].iter().all(|of| SQUARED.contains(of));
-        // A load that passes zero may leave tiny displacements in a run with larger ones.
-        match has_squares || candidate.forces <= ROUNDING * self.problem.largest_load {
+    /// Checks after a run that its largest forces and displacements have squares. If these underflow, zero residuals prove nothing.
+    pub(super) fn check_scales(&self, outcome: &Outcome) -> Result<(), RunError> {
+        let force = self.accepted.forces.max(self.problem.largest_load);
+        let displacement = outcome.most_displaced().record.displacement_max;
+        match [force, displacement].iter().all(|of| *of == 0.0 || SQUARED.contains(of)) {
             true => Ok(()),
-            false => Err(StepFailure::Unrepresentable { force: candidate.forces, displacement }),
+            false => {
+                let (source, last) =
+                    (StepFailure::Unrepresentable { force, displacement }, &outcome.last);
+                Err(RunError::Step { step: last.record.step, time: last.state.time, source })
+            }
         }
     }
 
