@@ -38,8 +38,8 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, Outcome, RunError, State, Step, StepFailure, StepRecord,
-    agreed, extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, RunError, State, Step, StepFailure, StepRecord, agreed,
+    extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
@@ -265,14 +265,13 @@ impl<'a> ContactStep<'a> {
     }
 
     /// Checks after a run that its largest forces and displacements have squares. If these underflow, zero residuals prove nothing.
-    pub(super) fn check_scales(&self, outcome: &Outcome) -> Result<(), RunError> {
+    pub(super) fn check_scales(&self, last: &Step) -> Result<(), RunError> {
         let force = self.accepted.forces.max(self.problem.largest_load);
-        let displacement = outcome.most_displaced().record.displacement_max;
+        let displacement = self.accepted.scales.displacement;
         match [force, displacement].iter().all(|of| *of == 0.0 || SQUARED.contains(of)) {
             true => Ok(()),
             false => {
-                let (source, last) =
-                    (StepFailure::Unrepresentable { force, displacement }, &outcome.last);
+                let source = StepFailure::Unrepresentable { force, displacement };
                 Err(RunError::Step { step: last.record.step, time: last.state.time, source })
             }
         }

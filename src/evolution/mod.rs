@@ -104,7 +104,7 @@ pub(crate) fn all_steps<'a>(
         }
     }
     while run.step(observer)? {}
-    run.contact_step.check_scales(&run.outcome)?;
+    run.contact_step.check_scales(&run.outcome.last)?;
     run.outcome.bound_violation = run.controller.violation();
     run.outcome.damage_error = run.controller.damage_error();
     Ok(run)
