@@ -82,8 +82,6 @@ except OSError as error:
     if code:
         print(f"error: {error.filename or 'standard output'}: {error.strerror}", file=sys.stderr)
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-except ImportError:
-    raise
 except Exception as error:
     # Each script refuses what it knows to be wrong, by name.
     code = 2
