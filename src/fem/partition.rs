@@ -89,7 +89,11 @@ impl Partition {
     /// ‖·‖₂ of a field with `block` components over the undivided body; max |·| if no squares can be held. Collective.
     pub fn norm(&self, field: &[f64], block: usize) -> f64 {
         let own = &field[..self.owned * block];
-        let norm = self.comm.total(own.iter().map(|v| v * v).sum::<f64>()).sqrt();
+        self.or_component(self.comm.total(own.iter().map(|v| v * v).sum::<f64>()).sqrt(), own)
+    }
+
+    /// `norm`, or max |·| of the field if its squares underflow. Collective.
+    fn or_component(&self, norm: f64, own: &[f64]) -> f64 {
         match norm {
             0.0 => self.comm.max(own.iter().fold(0.0, |max, v| maximum(max, v.abs()))),
             norm => norm,
@@ -102,11 +106,12 @@ impl Partition {
         self.comm.total(a[..owned].iter().zip(&b[..owned]).map(|(a, b)| a * b).sum())
     }
 
-    /// max |u_i| over the nodes i of the undivided body, u_i the vector at node i. Collective.
+    /// max |u_i| over the nodes i of the undivided body, u_i the vector at node i; the largest component if no squares
+    /// can be held. Collective.
     pub fn max_norm(&self, u: &[f64]) -> f64 {
-        let (owned, _) = u[..2 * self.owned].as_chunks::<2>();
-        let square = owned.iter().map(|[x, y]| x * x + y * y).fold(0.0, maximum);
-        self.comm.max(square).sqrt()
+        let own = &u[..2 * self.owned];
+        let squares = own.as_chunks::<2>().0.iter().map(|[x, y]| x * x + y * y);
+        self.or_component(self.comm.max(squares.fold(0.0, maximum)).sqrt(), own)
     }
 
     /// (min, max) of a field with one component over the undivided body. Collective.

@@ -1,7 +1,7 @@
 //! Infinitesimal rigid motions of a body, and their names in messages.
 
 use super::Body;
-use crate::{maximum, mesh::place};
+use crate::mesh::place;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -75,14 +75,9 @@ impl RigidMotion {
 
     /// The largest nodal |·| of the motion, and of u minus the motion, m. Collective.
     pub fn max_norms(&self, body: &Body, u: &[f64]) -> [f64; 2] {
-        let (mut rigid, mut rest) = (0.0, 0.0);
-        let nodes = body.nodes.points.iter().zip(u.as_chunks::<2>().0);
-        for (&point, &[ux, uy]) in nodes.take(body.nodes.partition.owned()) {
-            let [x, y] = self.at(point);
-            rigid = maximum(rigid, x * x + y * y);
-            rest = maximum(rest, (ux - x) * (ux - x) + (uy - y) * (uy - y));
-        }
-        [rigid, rest].map(|square| body.nodes.partition.comm().max(square).sqrt())
+        let motion = self.field(body);
+        let rest: Vec<_> = u.iter().zip(&motion).map(|(u, motion)| u - motion).collect();
+        [motion, rest].map(|of| body.nodes.partition.max_norm(&of))
     }
 }
 

@@ -121,11 +121,11 @@ impl ContactStep<'_> {
     /// support may move further, which is no reason for larger scales. Collective.
     fn rounding_of(&self, reference: &Reference, case: &LoadCase) -> f64 {
         let partition = &self.problem.body.nodes.partition;
-        let value = case.values.iter().fold(0.0_f64, |max, value| max.max(value.abs()));
-        match reference.is_zero() {
-            true => 0.0,
-            false => ROUNDING * partition.max_norm(&reference.field).min(value),
+        if reference.is_zero() {
+            return 0.0;
         }
+        let value = case.values.iter().fold(0.0_f64, |max, value| max.max(value.abs()));
+        ROUNDING * partition.max_norm(&reference.field).min(partition.comm().max(value))
     }
 }
 

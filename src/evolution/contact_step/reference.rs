@@ -17,11 +17,13 @@ pub(super) struct Reference {
     pub(super) field: Vec<f64>,
     /// The same in the nodal bases.
     unknowns: Vec<f64>,
+    /// Whether there was a motion, the same on all ranks: a rank without nodes has no displacements.
+    has_moved: bool,
 }
 
 impl Reference {
     pub(super) fn is_zero(&self) -> bool {
-        self.field.is_empty()
+        !self.has_moved
     }
 
     /// The prescribed unknowns and the bounds, measured from the reference.
@@ -55,6 +57,7 @@ impl Reference {
 
     /// Adds a rigid motion, given by nodal displacements.
     pub(super) fn add(&mut self, of: &Constraints, motion: &[f64]) {
+        self.has_moved = true;
         self.field.resize(motion.len(), 0.0);
         self.field.iter_mut().zip(motion).for_each(|(own, more)| *own += more);
         self.unknowns = self.field.clone();
