@@ -42,12 +42,13 @@ impl ContactSolver for ProjectedSor {
             bounds[bound.dof] = [bound.lower, bound.upper];
         }
         let mut report = ContactReport::default();
+        let rows = problem.stiffness.assembled_rows()?;
         for _ in 0..100_000 {
             report.iterations += 1;
             for i in 0..x.len() {
                 let [lower, upper] = bounds[i];
                 // Row i of K gives r = f_i − Σ_j K_ij c_j and K_ii.
-                let (r, diagonal) = problem.stiffness.read_row(i as i32, |columns, values| {
+                let (r, diagonal) = rows.read(i as i32, |columns, values| {
                     let row = columns.iter().map(|&j| j as usize).zip(values);
                     row.fold((load[i], 0.0), |(r, diagonal), (j, k)| {
                         (r - k * x[j], if j == i { *k } else { diagonal })

@@ -215,6 +215,7 @@ fn square(matrix: &Matrix) -> Result<String, PetscError> {
     let read = |columns: &[i32], values: &[f64]| {
         zip(columns, values).map(|(&j, &v)| (j as usize, v)).collect()
     };
-    let rows = (0..matrix.owned() as i32).map(|row| matrix.read_row(row, read));
+    let entries = matrix.assembled_rows()?;
+    let rows = (0..matrix.owned() as i32).map(|row| entries.read(row, read));
     Ok(sparse(matrix.owned(), &rows.collect::<Result<Vec<Row>, _>>()?))
 }

@@ -236,14 +236,14 @@ impl RankDivision {
         Ok(Some(Self { positions, interface, near, interior }))
     }
 
-    /// Reads the rows that this rank owns.
+    /// Reads the rows that this rank owns. Collective.
     fn blocks(&self, matrix: &Matrix) -> Result<Blocks, PetscError> {
         let (interior, shared) = (self.interior, self.shared());
         let (mut local, mut largest_row_sum) = (LowerTriangle::default(), 0.0_f64);
         let mut interface = DMatrix::zeros(self.interface.len(), self.interface.len());
-        let rows = matrix.rows();
+        let (rows, entries) = (matrix.rows(), matrix.assembled_rows()?);
         for (row, &position) in rows.clone().zip(&self.positions) {
-            matrix.read_row(row, |columns, values| {
+            entries.read(row, |columns, values| {
                 let mut row_sum = 0.0;
                 for (&column, &value) in columns.iter().zip(values) {
                     match self.position(rows.start, column) {

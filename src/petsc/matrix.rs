@@ -222,21 +222,18 @@ impl Matrix {
         Ok(rows as usize)
     }
 
-    /// Calls `reader` with the columns (increasing) and the values of an owned row (MatGetRow). The first call
-    /// after a change of the matrix is collective.
+    /// The owned rows with their present entries. Collective, as the entries may have to be written first; a rank
+    /// without rows calls it too.
     ///
     /// # Errors
-    /// The row is not owned.
-    pub fn read_row<R>(
-        &self,
-        row: i32,
-        reader: impl FnOnce(&[i32], &[f64]) -> R,
-    ) -> Result<R, PetscError> {
+    /// PETSc failed.
+    pub fn assembled_rows(&self) -> Result<AssembledRows<'_>, PetscError> {
         self.assembled()?;
-        self.read_stored(row, reader)
+        Ok(AssembledRows(self))
     }
 
-    /// As [`Self::read_row`], with the stored entries: the columns are right, the values may be those of an earlier state.
+    /// As [`AssembledRows::read`], with the stored entries: the columns are right, the values may be those of an earlier
+    /// state.
     pub(crate) fn read_stored<R>(
         &self,
         row: i32,
@@ -256,5 +253,23 @@ impl Matrix {
     /// Number of rows this rank owns.
     pub fn owned(&self) -> usize {
         self.rows.len()
+    }
+}
+
+/// The owned rows of a matrix with its present entries.
+#[derive(Clone, Copy)]
+pub struct AssembledRows<'a>(&'a Matrix);
+
+impl AssembledRows<'_> {
+    /// Calls `reader` with the columns (increasing) and the values of an owned row (MatGetRow).
+    ///
+    /// # Errors
+    /// The row is not owned.
+    pub fn read<R>(
+        self,
+        row: i32,
+        reader: impl FnOnce(&[i32], &[f64]) -> R,
+    ) -> Result<R, PetscError> {
+        self.0.read_stored(row, reader)
     }
 }

@@ -367,13 +367,18 @@ fn on_one_rank_every_reduction_is_the_value_itself() {
 /// More ranks than nodes: some have neither nodes nor triangles.
 #[test]
 fn a_rank_without_triangles_changes_nothing() {
-    for degree in ["1", "2"] {
+    let cases = [
+        ("discretisation.displacement=1", None),
+        ("discretisation.displacement=2", Some("--bars")),
+        ("contact.solver='tao'", None),
+        ("contact.solver='penalty-duality'", Some("--bound")),
+    ];
+    for (setting, option) in cases {
         let directory = TestDirectory::new();
         directory.write("square.msh", &square(1));
-        let degree = format!("discretisation.displacement={degree}");
-        let few = sets(&["time.step=0.5", &degree]);
-        directory.run(&[&few[..], &["--out", "one"]].concat());
-        let said = run_on_ranks(&directory, 6, &[&few[..], &["--out", "six"]].concat());
+        let arguments = [sets(&["time.step=0.5", setting]), Vec::from_iter(option)].concat();
+        directory.run(&[&arguments[..], &["--out", "one"]].concat());
+        let said = run_on_ranks(&directory, 6, &[&arguments[..], &["--out", "six"]].concat());
         assert_eq!((said.code, said.err.as_str()), (Some(0), ""), "{said:?}");
         same_history(&directory, "six", "one");
     }

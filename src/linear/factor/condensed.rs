@@ -27,19 +27,20 @@ impl Factor {
         self.substructure.as_ref().is_some_and(|(size, _)| *size == rows)
     }
 
-    /// The condensed unknowns that are coupled with others in `k` but not in `operator`.
+    /// The condensed unknowns that are coupled with others in `k` but not in `operator`. Collective.
     pub(crate) fn prescribed_in(
         &self,
         k: &Matrix,
         operator: &Matrix,
     ) -> Result<Vec<usize>, PetscError> {
-        let mut prescribed = Vec::new();
+        let (mut prescribed, first) = (Vec::new(), k.rows().start);
+        let [k, operator] = [k.assembled_rows()?, operator.assembled_rows()?];
         for &unknown in &self.condensed.1 {
-            let row = k.rows().start + unknown as i32;
+            let row = first + unknown as i32;
             let coupled = |columns: &[i32], values: &[f64]| {
                 columns.iter().zip(values).any(|(column, value)| *column != row && *value != 0.0)
             };
-            if k.read_row(row, coupled)? && !operator.read_row(row, coupled)? {
+            if k.read(row, coupled)? && !operator.read(row, coupled)? {
                 prescribed.push(unknown);
             }
         }
