@@ -5,8 +5,9 @@ use crate::{
     estimate::{RecoveredStrains, UNLOADED, at_vertices},
     evolution::{Choices, Outcome, RunError, Step, all_steps},
     mesh::Mesh,
+    observe::{ObservedProblem, Value},
     petsc::{PetscError, Session},
-    problem::{DiscreteProblem, State, Value},
+    problem::State,
 };
 use nalgebra::Vector3;
 
@@ -22,7 +23,7 @@ const LARGER: f64 = 1.5;
 
 /// A run with few steps, and its errors on each triangle of the undivided mesh.
 pub(super) struct FewStepRun<'a> {
-    pub(super) problem: &'a DiscreteProblem,
+    pub(super) problem: &'a ObservedProblem,
     pub(super) outcome: Outcome,
     /// The extremes at the end.
     pub(super) extremes: Extremes<'a>,
@@ -53,7 +54,7 @@ impl<'a> FewStepRun<'a> {
     /// the times `followed` of the run with which this one is compared. Collective.
     pub(super) fn run(
         session: &Session,
-        problem: &'a DiscreteProblem,
+        problem: &'a ObservedProblem,
         choices: &Choices,
         triangles: usize,
         instants: usize,
@@ -229,7 +230,7 @@ impl History {
     }
 
     /// Records an accepted step. Collective.
-    fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
+    fn observe(&mut self, problem: &ObservedProblem, step: &Step) -> Result<(), PetscError> {
         let time = step.state.time;
         self.times.push(time);
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
@@ -242,7 +243,7 @@ impl History {
     }
 
     /// Estimates the errors of a state. Collective.
-    fn estimate(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), PetscError> {
+    fn estimate(&mut self, problem: &ObservedProblem, state: &State) -> Result<(), PetscError> {
         let body = &problem.body;
         self.last = Some(state.time);
         self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
@@ -264,7 +265,7 @@ impl History {
 }
 
 /// Values of this rank's triangles for all `count` triangles of the undivided mesh. Collective.
-fn gathered(problem: &DiscreteProblem, own: &[f64], count: usize) -> Vec<f64> {
+fn gathered(problem: &ObservedProblem, own: &[f64], count: usize) -> Vec<f64> {
     let body = &problem.body;
     let mut values = vec![0.0; count];
     let own = body.global_triangles.iter().zip(own).take(body.own_triangles);

@@ -2,12 +2,11 @@
 
 use super::{Measured, conclusion::KINKS_OF_TABLE};
 use crate::{
+    advice::Singular,
     model::von_mises,
+    observe::{ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Value, rows_of},
     petsc::PetscError,
-    problem::{
-        ContactRow, Dimension, DiscreteProblem, Figure, NodalStress, Of, Singular, State, Value,
-        rows_of,
-    },
+    problem::State,
     scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
@@ -40,7 +39,7 @@ impl Extreme {
 
 /// The extremes of a state, with the stresses and pressures from which they come.
 pub struct Extremes<'a> {
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     /// The extremes of stresses and pressures, in the order of the figures.
     pub all: Vec<Extreme>,
     /// The stresses at the points of this rank, Pa, and the rows of Γ_C.
@@ -56,7 +55,7 @@ impl<'a> Extremes<'a> {
     /// # Errors
     /// PETSc failed.
     pub(super) fn new(
-        problem: &'a DiscreteProblem,
+        problem: &'a ObservedProblem,
         state: &State,
         values: &[Value],
     ) -> Result<Self, PetscError> {
@@ -107,7 +106,7 @@ impl<'a> Extremes<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn of(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         state: &State,
         values: &[Value],
         measured: &Measured,

@@ -6,10 +6,10 @@ use super::{
     sizes::{divided, influences, sharpened, size_ratios, touching},
 };
 use crate::{
+    advice::unresolved,
     evolution::AIM,
     mesh::{Mesh, MeshError, Order, Refinement, sorted},
     petsc::{PetscError, Session},
-    problem::unresolved,
     scene::Scene,
 };
 use std::{collections::HashSet, mem::take};

@@ -14,8 +14,8 @@ use super::{
 use crate::{
     evolution::{AIM, Choices},
     mesh::{Mesh, Order, Refinement},
+    observe::{Bar, Dimension, Figure, ObservedProblem, Of},
     petsc::Session,
-    problem::{Bar, Dimension, DiscreteProblem, Figure, Of},
     scene::Probe,
 };
 use std::slice::from_ref;
@@ -116,7 +116,7 @@ impl Measurement {
     ) -> Result<Self, AdaptError> {
         let scene = coarse.problem.scene();
         let problem = |mesh: &Mesh| {
-            let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?;
+            let problem = ObservedProblem::new(scene.clone(), mesh.clone())?;
             problem.restrict(session).map_err(AdaptError::from)
         };
         let finer = Refinement::start(answer.mesh.clone()).refine_everywhere()?;
@@ -295,7 +295,7 @@ impl Measurement {
     }
 
     /// The cause of the error of the figure or norm `name` of `problem`.
-    pub(super) fn cause(&self, name: &str, problem: &DiscreteProblem) -> Cause {
+    pub(super) fn cause(&self, name: &str, problem: &ObservedProblem) -> Cause {
         let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
             let of_damage = || Cause::Damage(self.of_damage.clone());
             return if name == "damage" { of_damage() } else { Cause::Fields(1.0) };

@@ -38,8 +38,9 @@ use crate::{
     evolution::{Choices, RunError},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
+    observe::{Bar, ObservedProblem},
     petsc::{PetscError, Session},
-    problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
+    problem::{Collapse, LoadCurve, SetupError},
     scene::{Scene, Stepping, rounded},
 };
 pub use answer::INSTANTS;
@@ -282,14 +283,14 @@ impl<'a> AccuracyLoop<'a> {
     }
 
     /// The problem on `mesh`, on this rank's part of it. Collective.
-    fn problem(&self, mesh: &Mesh) -> Result<DiscreteProblem, AdaptError> {
-        Ok(DiscreteProblem::new(self.scene.clone(), mesh.clone())?.restrict(self.session)?)
+    fn problem(&self, mesh: &Mesh) -> Result<ObservedProblem, AdaptError> {
+        Ok(ObservedProblem::new(self.scene.clone(), mesh.clone())?.restrict(self.session)?)
     }
 
     /// A run of `problem` with estimates at about `instants` times. Collective.
     fn solve<'b>(
         &mut self,
-        problem: &'b DiscreteProblem,
+        problem: &'b ObservedProblem,
         instants: usize,
     ) -> Result<FewStepRun<'b>, AdaptError> {
         let (session, choices) = (self.session, self.choices);
@@ -405,7 +406,7 @@ fn with_tolerance(mut scene: Scene, tolerance: f64) -> Scene {
 /// The scene, with adaptive steps if loads or gaps pass by within one of its steps. An error if the body turns over, or has no
 /// figure of the name for which an accuracy is required.
 fn with_passing_loads(session: &Session, scene: Scene, mesh: &Mesh) -> Result<Scene, AdaptError> {
-    let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
+    let problem = ObservedProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
     let figures = problem.figures.iter().filter(|of| of.dimension.has_bar());
     let names = Vec::from_iter(figures.map(|figure| &*figure.name));
     scene.check_figures(&names).map_err(SetupError::from)?;

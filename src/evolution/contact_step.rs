@@ -38,15 +38,15 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, RunError, State, Step, StepFailure, StepRecord, agreed,
-    extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, ObservedProblem, RunError, State, Step, StepFailure,
+    StepRecord, agreed, extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
+    observe::SHOWN_AS_ZERO,
     petsc::{PetscError, Session, Vector, stage},
-    problem::SHOWN_AS_ZERO,
 };
 use certificate::Candidate;
 use decision::{Attempt, Decision};
@@ -59,7 +59,7 @@ use std::{ops::RangeInclusive, time::Instant};
 /// Solves the contact problems of a run, one after the other.
 pub struct ContactStep<'a> {
     session: &'a Session,
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     /// The chosen solver, then the one for steps in which it stops short of the tolerance, if there is one.
     solvers: Vec<SharedSolver>,
     /// Solves the linear systems of all solvers.
@@ -119,7 +119,7 @@ impl<'a> ContactStep<'a> {
     /// There is no solver of that name, or PETSc failed.
     pub fn new(
         session: &'a Session,
-        problem: &'a DiscreteProblem,
+        problem: &'a ObservedProblem,
         choices: &Choices,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
@@ -348,7 +348,7 @@ impl<'a> ContactStep<'a> {
 
     /// Adds the motions that contact alone constrains, with these amplitudes, to a reference.
     fn move_rigidly(&self, reference: &mut Reference, amplitudes: &DVector<f64>) {
-        let DiscreteProblem { motions, body, constraints, .. } = self.problem;
+        let DiscreteProblem { motions, body, constraints, .. } = &**self.problem;
         reference.add(constraints, &motions.combined(body, amplitudes).field(body));
     }
 }

@@ -11,8 +11,9 @@ use super::{
 use crate::{
     fem::Elements,
     model::von_mises,
+    observe::{NodalStress, ObservedProblem, principal, principal_direction},
     petsc::PetscError,
-    problem::{DiscreteProblem, NodalStress, State, principal, principal_direction},
+    problem::State,
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -67,7 +68,7 @@ impl FieldWriter {
     ///
     /// # Errors
     /// The names of the columns of `contact.csv` cannot be written.
-    pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
+    pub fn new(folder: &Path, problem: &ObservedProblem) -> Result<Self, OutputError> {
         let comm = problem.body.nodes.partition.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
         let stress = Arc::clone(problem.nodal_stress());
@@ -113,7 +114,7 @@ impl FieldWriter {
     ///
     /// # Errors
     /// A file of this frame or of the previous one cannot be written.
-    pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
+    pub fn add(&mut self, problem: &ObservedProblem, state: &State) -> Result<(), OutputError> {
         self.complete()?;
         let number = format!("{:0width$}", self.frames, width = self.digits);
         let (stem, contact_file) = (format!("fields_{number}"), format!("contact_{number}.vtu"));
@@ -196,7 +197,7 @@ fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
 /// and the remaining gap NaN. At a corner with two gap conditions they are the larger pressure and the smaller gap.
 /// Collective.
 fn point_data(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     points: &NodalStress,
     state: &State,
     pressures: &[(usize, f64)],
@@ -249,7 +250,7 @@ fn stress_data(stresses: &[[f64; 4]]) -> [DataArray; 4] {
 
 /// The mean stress of each triangle, xx, yy, xy, as the finite elements have it. If there are several materials,
 /// each triangle has a number: 0, or 1, 2, … for the surfaces of the scene by name.
-fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
+fn cell_data(problem: &ObservedProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
     let zeta = problem.zeta_at_points(&state.zeta);
     let stress = elasticity.stresses(body, &zeta, &state.u);

@@ -27,8 +27,9 @@ use crate::{
     fem::{Body, for_elements},
     mesh::{Order, sorted},
     model::Material,
+    observe::ObservedProblem,
     petsc::PetscError,
-    problem::{DiscreteProblem, ElementLoads, State},
+    problem::{ElementLoads, State},
     scene::Condition,
 };
 use composite::{Frame, LoadedTriangle, SideForces};
@@ -94,7 +95,7 @@ pub(crate) fn proved_error(
 
 /// A stress τ in equilibrium with the loads, near that of a computed state, and its pressure p ≥ 0 on Γ_C.
 pub struct EquilibratedStress<'a> {
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     triangles: Vec<StressedTriangle>,
     stars: Vec<Star>,
     boundary: HashMap<[usize; 2], BoundaryEdge>,
@@ -303,7 +304,7 @@ fn sides(body: &Body, stars: &[Star]) -> HashMap<[usize; 2], Side> {
 /// The triangles with stresses that have the same forces at the nodes as those of the stiffness matrix: affine between the vertices
 /// or the quadrature points.
 fn stressed(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     [zeta_at_points, zeta_at_vertices]: [&[f64]; 2],
     u: &[f64],
     loads: &ElementLoads,
@@ -347,7 +348,7 @@ fn stressed(
 
 /// The forces of loads and contact on the edges of the boundary, and the directions in which supports hold them.
 fn boundary(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     edges: &[ContactEdge],
     sides: &HashMap<[usize; 2], Side>,
     loads: &ElementLoads,

@@ -2,7 +2,7 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    evolution::{DiscreteProblem, Outcome, State},
+    evolution::{DiscreteProblem, ObservedProblem, Outcome, State},
     linear::{LinearSystem, SolveReport},
     petsc::PetscError,
 };
@@ -93,7 +93,7 @@ impl<'a> ContactStep<'a> {
     /// residual forces. Collective.
     fn of_state(&mut self, state: &State, max: f64) -> Result<Accuracy, PetscError> {
         let problem = self.problem;
-        let DiscreteProblem { body, constraints, .. } = problem;
+        let DiscreteProblem { body, constraints, .. } = &**problem;
         let partition = &body.nodes.partition;
         let mut accuracy = Accuracy { time: state.time, ..Accuracy::default() };
         if max == 0.0 || partition.max_norm(&state.u) == 0.0 {
@@ -126,7 +126,7 @@ impl<'a> ContactStep<'a> {
         limit: impl Fn(f64) -> f64,
     ) -> Result<(SolveReport, Vec<f64>), PetscError> {
         let Self { problem, stiffness, elastic, load, c, .. } = self;
-        let DiscreteProblem { body, constraints, .. } = problem;
+        let DiscreteProblem { body, constraints, .. } = &***problem;
         constraints.bases.force_to_local(&mut forces);
         constraints.bases.zero_fixed(&mut forces);
         held.iter().for_each(|&dof| forces[dof] = 0.0);
@@ -167,7 +167,7 @@ impl<'a> ContactStep<'a> {
     }
 
     /// The problem.
-    pub(crate) fn problem(&self) -> &'a DiscreteProblem {
+    pub(crate) fn problem(&self) -> &'a ObservedProblem {
         self.problem
     }
 }

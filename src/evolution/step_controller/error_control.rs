@@ -6,7 +6,7 @@ use crate::{
     evolution::{DiscreteProblem, LoadCurve},
     fem::Body,
     maximum,
-    problem::NEGLIGIBLE_DAMAGE,
+    observe::NEGLIGIBLE_DAMAGE,
     scene::{APART, Stepping},
 };
 use nalgebra::DVector;

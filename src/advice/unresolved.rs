@@ -1,15 +1,15 @@
 //! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
 //! nodes, and may vary more between them.
 
-use super::{
-    DiscreteProblem, State,
-    loads::{DEVIATION, NOTED, SAMPLE_TIMES, centroid, edge_parts, triangle_parts, triangle_point},
-};
 use crate::{
     ROUNDING,
     fem::{DamageSystem, GAUSS, POINTS, parabola, part_point, six_points},
     mesh::{Mesh, Order, distance, longest_side, midpoint, sorted},
     petsc::{PetscError, Session},
+    problem::{
+        DEVIATION, DiscreteProblem, NOTED, SAMPLE_TIMES, State, centroid, edge_parts,
+        triangle_parts, triangle_point,
+    },
     scene::{Condition, Expression, Scene},
 };
 use std::{

@@ -17,12 +17,12 @@
 //! the length there, the reaction F = (λ_a + λ_b) p becomes the pressures p_a = p − J λ_b/(λ_a + λ_b) and p_b = p_a + J. The
 //! jump J is the difference of the pressures that the next two line nodes of each side extrapolate.
 
-use super::State;
 use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge},
     mesh::{BoundaryFace, Lines, distance, joined_faces},
+    problem::State,
     scene::{Expression, Gap},
 };
 use serde::Serialize;

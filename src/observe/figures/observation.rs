@@ -2,11 +2,12 @@
 
 use super::{SHOWN_AS_ZERO, Value};
 use crate::{
-    petsc::{Communicator, PetscError},
-    problem::{
-        ContactFigures, ContactRow, DiscreteProblem, MeanDisplacement, NodalStress, State,
-        Strained, rows_of,
+    observe::{
+        ContactFigures, ContactRow, MeanDisplacement, NodalStress, ObservedProblem, Strained,
+        rows_of,
     },
+    petsc::{Communicator, PetscError},
+    problem::State,
 };
 
 /// The quantities from which figures take their values. All are sums or extremes over the
@@ -37,7 +38,7 @@ pub(crate) struct Observation {
     pub probes: Vec<[f64; 7]>,
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The observation of a state with the nodal loads `load` and the residual forces `unbalanced` = f − Ku, and its figures.
     /// Forces up to `rounding`, N per metre of thickness, are zero. Collective.
     ///
@@ -63,7 +64,7 @@ impl Observation {
     /// # Errors
     /// PETSc failed.
     pub(crate) fn new(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         state: &State,
         load: &[f64],
         unbalanced: &[f64],

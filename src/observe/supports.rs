@@ -1,12 +1,13 @@
 //! The boundaries that support the body and the forces they exert.
 
-use super::{ContactLine, DiscreteProblem, State, boundary_conditions::BoundaryConditions};
+use super::{ContactLine, ObservedProblem};
 use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
     mesh::{BoundaryFace, Lines, extent, sorted},
-    scene::{Boundary, Scene, SurfaceLoad},
+    problem::{DiscreteProblem, State},
+    scene::{Boundary, SurfaceLoad},
 };
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::{
@@ -44,16 +45,14 @@ struct NodeEdge {
 }
 
 impl Supports {
-    /// The supports of `scene` on the undivided `body`, with its `conditions` and the lines of its boundary.
-    pub(super) fn new(
-        scene: &Scene,
-        body: &Body,
-        conditions: &BoundaryConditions,
-        lines: &Lines,
-    ) -> Self {
+    /// The supports of an undivided problem, with the lines of its boundary.
+    pub(super) fn new(problem: &DiscreteProblem, lines: &Lines) -> Self {
+        let (scene, body) = (problem.scene(), &problem.body);
         let closed = ROUNDING * extent(&body.nodes.points);
-        let mut supports = Self { names: conditions.supports.clone(), closed, ..Self::default() };
-        for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
+        let names = scene.boundaries.iter().filter(|of| of.is_support());
+        let names = names.map(|of| of.name.clone()).collect();
+        let mut supports = Self { names, closed, ..Self::default() };
+        for (boundary, row) in &problem.prescribed {
             supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
         }
         let contact = scene.boundaries.iter().filter_map(|boundary @ Boundary { name, .. }| {
@@ -244,7 +243,7 @@ impl Supports {
     }
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// σ of a state in a triangle at barycentric coordinates, Pa.
     pub(super) fn stress_in(&self, state: &State) -> impl Fn(usize, [f64; 3]) -> Vector3<f64> {
         let zeta = LazyCell::new(|| self.zeta_at_points(&state.zeta));

@@ -11,7 +11,8 @@ pub(crate) use observation::{Observation, greatest};
 pub use scales::Bar;
 pub(crate) use scales::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO};
 
-use crate::scene::Units;
+use super::Supports;
+use crate::{problem::DiscreteProblem, scene::Units};
 use serde::{Deserialize, Serialize};
 use std::{fmt, iter, ops::Index, slice};
 
@@ -153,23 +154,22 @@ impl Figure {
 }
 
 /// The parts of a scene that have figures of their own, by their names.
-#[derive(Default)]
-pub(crate) struct Parts<'a> {
+struct Parts<'a> {
     /// The materials, if there are several.
-    pub materials: Vec<&'a str>,
+    materials: Vec<&'a str>,
     /// The boundaries with a table.
-    pub boundaries: Vec<PartOfBoundary<'a>>,
-    pub probes: Vec<&'a str>,
+    boundaries: Vec<PartOfBoundary<'a>>,
+    probes: Vec<&'a str>,
 }
 
 /// A boundary with a table.
-pub(crate) struct PartOfBoundary<'a> {
-    pub name: &'a str,
+struct PartOfBoundary<'a> {
+    name: &'a str,
     /// Its number among the supports, and among the foundations.
-    pub support: Option<usize>,
-    pub foundation: Option<usize>,
+    support: Option<usize>,
+    foundation: Option<usize>,
     /// Does its foundation move?
-    pub moves: bool,
+    moves: bool,
 }
 
 /// The figures of a problem.
@@ -190,8 +190,25 @@ pub fn in_words(material: &str) -> &str {
 }
 
 impl Figures {
+    /// The list of all figures of a problem with these supports.
+    pub(super) fn of(problem: &DiscreteProblem, supports: &Supports) -> Self {
+        let several = if problem.materials.len() > 1 { &problem.materials[..] } else { &[] };
+        let number = |names: &[String], of: &str| names.iter().position(|name| name == of);
+        let boundaries = problem.scene().boundaries.iter().map(|of| PartOfBoundary {
+            name: &of.name,
+            support: number(&supports.names, &of.name),
+            foundation: number(&problem.foundations, &of.name),
+            moves: of.gap().is_some_and(|gap| gap.distance.depends_on_time()),
+        });
+        Self::new(&Parts {
+            materials: several.iter().map(|(_, name)| &**name).collect(),
+            boundaries: boundaries.collect(),
+            probes: problem.scene().probes.iter().map(|probe| &*probe.name).collect(),
+        })
+    }
+
     /// The list of all figures.
-    pub(crate) fn new(parts: &Parts) -> Self {
+    fn new(parts: &Parts) -> Self {
         use Dimension::{
             ContactLength, Force, Given, Length, Moment, OfZeta, Place, Stress, Work, Zeta,
         };

@@ -1,9 +1,10 @@
 //! The mean displacement of each boundary with a table, and the travel of its foundation.
 
-use super::{DiscreteProblem, State};
+use super::ObservedProblem;
 use crate::{
     fem::{Body, Subdomain},
     mesh::Lines,
+    problem::State,
     scene::Scene,
 };
 use std::collections::BTreeMap;
@@ -41,18 +42,18 @@ impl Means {
     }
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The mean displacements of the boundaries with a table. Collective.
     pub(super) fn mean_displacements(&self, state: &State) -> Vec<MeanDisplacement> {
         let mut sums = vec![[0.0; 4]; self.means.0.len()];
         for ((lengths, boundary), sums) in
-            self.means.0.iter().zip(&self.scene.boundaries).zip(&mut sums)
+            self.means.0.iter().zip(&self.scene().boundaries).zip(&mut sums)
         {
             let gap = boundary.gap().filter(|gap| gap.distance.depends_on_time());
             for (&node, length) in lengths {
                 let [x, y] = self.body.nodes.points[node];
                 let gap = |t: f64| gap.map_or(0.0, |gap| gap.distance.eval(x, y, t));
-                let travel = gap(self.scene.start()) - gap(state.time);
+                let travel = gap(self.scene().start()) - gap(state.time);
                 let values = [state.u[2 * node], state.u[2 * node + 1], travel, 1.0];
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += length * value);
             }
