@@ -121,10 +121,15 @@ impl<'a> Estimate<'a> {
             unknowns: 2 * self.run.problem.body.nodes.partition.total(),
             rounds,
             error: self.error,
-            damage_error: self.run.problem.damage().and(measured).map(|of| of.damage),
+            damage_error: self
+                .run
+                .problem
+                .damage()
+                .and(measured)
+                .map(|of| of.result.damage.unwrap_or(0.0)),
             damage: self.run.damage(),
             steps: MAX_SHARE_OF_STEPS * self.accuracy,
-            measured: measured.map_or_else(Measured::default, Measurement::result),
+            measured: measured.map_or_else(Measured::default, |of| of.result.clone()),
             worst: measured.and_then(worst),
             not_reached: end.filter(|end| **end != End::Reached).map(End::to_string),
         }

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     evolution::{AIM, Choices},
     mesh::{Mesh, Order, Refinement},
-    observe::{Bar, Dimension, Figure, ObservedProblem, Of},
+    observe::{Dimension, Figure, ObservedProblem, Of},
     petsc::Session,
     scene::Probe,
 };
@@ -73,18 +73,12 @@ impl Cause {
 /// The errors of a run, from its changes when the mesh is bisected.
 #[derive(Default)]
 pub(super) struct Measurement {
-    /// The error bars of the figures; empty if the run ends at ζ_*.
-    pub(super) bars: Vec<Bar>,
-    /// The extremes that the meshes do not settle. They have no bars.
-    pub(super) unsettled: Vec<String>,
-    /// The error of ζ at the end over the damage, in L².
-    pub(super) damage: f64,
+    /// The errors of a run on the mesh. That of u is (‖u_h − u_{h/2}‖ / ‖u_{h/2}‖) / √(1 − r²), with r as in [`Sequence`].
+    pub(super) result: Measured,
     /// The relative error of u: the one measured at the end, or the estimate at the worst time if that is larger.
-    pub(super) displacement: f64,
-    /// The measured one, (‖u_h − u_{h/2}‖ / ‖u_{h/2}‖) / √(1 − r²), with r as in [`Sequence`]; 0 if a run stops.
-    at_end: f64,
+    displacement: f64,
     /// The error of the time of ζ_*, s, and this time; the error is infinite if only one of the two runs reaches it.
-    pub(super) stop: Option<[f64; 2]>,
+    stop: Option<[f64; 2]>,
     /// Per triangle of the mesh: its share of the squared relative error of u, from the estimates on its parts, and
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
@@ -164,16 +158,18 @@ impl Measurement {
         let is_like = coarse.stop().is_none() && answer.times == before.last()?.times;
         let sequence = is_like.then(|| Sequence::new(before, answer, from_ref(fine), false))?;
         // From this mesh to the one before, the error falls as its estimate does.
-        let at_end = self.at_end * answer.error / before.last()?.error;
+        let at_end = self.result.displacement * answer.error / before.last()?.error;
         let displacement = coarse.relative().0.max(at_end);
-        let mut measured = Self { at_end, displacement, ..Self::default() };
+        let mut measured = Self { displacement, ..Self::default() };
+        measured.result.displacement = at_end;
         if coarse.problem.damage().is_some() {
             let [shares, largest] = damage(answer, finer, fine);
             // The finer mesh has an error, too: about r times that of the mesh before.
-            measured.damage = shares.iter().sum::<f64>().sqrt() + sequence.rate() * self.damage;
+            let before = sequence.rate() * self.result.damage.unwrap_or(0.0);
+            measured.result.damage = Some(shares.iter().sum::<f64>().sqrt() + before);
             measured.zeta = largest;
         }
-        measured.unsettled = self.unsettled.clone();
+        measured.result.unsettled = self.result.unsettled.clone();
         measured.set_bars_of_settled(&sequence, coarse);
         Some(measured)
     }
@@ -204,13 +200,14 @@ impl Measurement {
             return measured;
         }
         let change = displacement(coarse, &answer.mesh, finer, fine);
-        measured.at_end = change / (1.0 - sequence.rate().powi(2)).sqrt();
-        measured.displacement = measured.displacement.max(measured.at_end);
+        let at_end = change / (1.0 - sequence.rate().powi(2)).sqrt();
+        measured.result.displacement = at_end;
+        measured.displacement = measured.displacement.max(at_end);
         if problem.damage().is_some() {
             let [shares, largest] = damage(answer, finer, finer_answer);
             let square = (1.0 - sequence.rate()).powi(-2);
             measured.of_damage = shares.iter().map(|share| square * share).collect();
-            measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
+            measured.result.damage = Some(measured.of_damage.iter().sum::<f64>().sqrt());
             measured.zeta = largest;
         }
         measured.of_points = fine.extremes.named(&problem.singular_points());
@@ -220,7 +217,8 @@ impl Measurement {
     /// Sets the bars of the figures, or of the time of ζ_*. Collective.
     fn set_bars(&mut self, sequence: &Sequence, coarse: &FewStepRun, fine: &FewStepRun) {
         self.stop = sequence.stop();
-        if self.stop.is_some() {
+        if let Some([error, _]) = self.stop {
+            self.result.stop = Some(error).filter(|error| error.is_finite());
             return;
         }
         let problem = fine.problem;
@@ -231,7 +229,7 @@ impl Measurement {
             sequence.settles(part.number, part)
         };
         let unsettled = self.of_points.iter().filter(|of| !settles(of));
-        self.unsettled = unsettled.map(|of| of.name.clone()).collect();
+        self.result.unsettled = unsettled.map(|of| of.name.clone()).collect();
         self.set_bars_of_settled(sequence, coarse);
     }
 
@@ -243,29 +241,22 @@ impl Measurement {
             dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
-        self.bars = problem.bars(&errors, &coarse.scales(&self.unsettled));
-        self.bars.retain(|bar| !self.unsettled.contains(&bar.name));
-        problem.join_bars(&mut self.bars, coarse.values());
+        let Measured { bars, unsettled, .. } = &mut self.result;
+        *bars = problem.bars(&errors, &coarse.scales(unsettled));
+        bars.retain(|bar| !unsettled.contains(&bar.name));
+        problem.join_bars(bars, coarse.values());
     }
 
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.
     pub(super) fn leave_out(&mut self, names: &[String]) {
-        self.bars.retain(|bar| !names.contains(&bar.name));
-        self.unsettled.extend_from_slice(names);
+        self.result.bars.retain(|bar| !names.contains(&bar.name));
+        self.result.unsettled.extend_from_slice(names);
     }
 
     /// Why a figure in `names` has no accuracy, if the meshes do not settle one.
     pub(super) fn without_accuracy(&self, names: &[String]) -> Option<End> {
-        let name = names.iter().find(|name| self.unsettled.contains(name))?;
+        let name = names.iter().find(|name| self.result.unsettled.contains(name))?;
         Some(End::Unsettled(name.clone()))
-    }
-
-    /// The errors of a run on the mesh.
-    pub(super) fn result(&self) -> Measured {
-        let stop = self.stop.map(|[error, _]| error).filter(|error| error.is_finite());
-        let damage = (!self.zeta.is_empty()).then_some(self.damage);
-        let (bars, unsettled) = (self.bars.clone(), self.unsettled.clone());
-        Measured { bars, unsettled, stop, damage, displacement: self.at_end }
     }
 
     /// The largest measured error in `names`, or of all, over the error that the `accuracy` allows; infinite without errors.
@@ -277,11 +268,11 @@ impl Measurement {
     /// and the time of ζ_*. The largest error over its share comes first.
     pub(super) fn errors(&self, names: &[String]) -> Vec<MeasuredError> {
         let norms = [
-            ("damage", self.damage, 1.0),
+            ("damage", self.result.damage.unwrap_or(0.0), 1.0),
             ("displacement", self.displacement, SHARE),
             ("stopped_at", self.stop.map_or(0.0, |[error, time]| error / time), AIM),
         ];
-        let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
+        let figures = self.result.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
         let is_named = |name: &str| names.is_empty() || names.iter().any(|other| other == name);
         let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
         let mut errors: Vec<_> = errors
@@ -296,7 +287,7 @@ impl Measurement {
 
     /// The cause of the error of the figure or norm `name` of `problem`.
     pub(super) fn cause(&self, name: &str, problem: &ObservedProblem) -> Cause {
-        let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
+        let Some(bar) = self.result.bars.iter().find(|bar| bar.name == name) else {
             let of_damage = || Cause::Damage(self.of_damage.clone());
             return if name == "damage" { of_damage() } else { Cause::Fields(1.0) };
         };

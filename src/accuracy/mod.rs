@@ -208,7 +208,7 @@ pub fn measured_errors(
             let answer = Answer::new(&run, mesh);
             let measured =
                 Measurement::new(session, &answer, &run, choices, &[], None, &mut fixed.limits);
-            return Ok(measured?.result());
+            return Ok(measured?.result);
         }
     }
 }
