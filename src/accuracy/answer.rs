@@ -5,7 +5,7 @@ use crate::{
     estimate::{RecoveredStrains, UNLOADED, at_vertices},
     evolution::{Choices, Outcome, RunError, Step, all_steps},
     mesh::Mesh,
-    observe::{ObservedProblem, Value},
+    observe::ObservedProblem,
     petsc::{PetscError, Session},
     problem::State,
 };
@@ -27,11 +27,11 @@ pub(super) struct FewStepRun<'a> {
     pub(super) outcome: Outcome,
     /// The extremes at the end.
     pub(super) extremes: Extremes<'a>,
-    history: History,
+    pub(super) history: History,
 }
 
 /// The figures and the estimated errors of the steps of a run.
-struct History {
+pub(super) struct History {
     /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
     last: Option<f64>,
@@ -40,13 +40,13 @@ struct History {
     worst: f64,
     /// max_t ‖u‖², N m per metre of thickness, and the maximum |u| at any time, m.
     energy: f64,
-    displacement: f64,
+    pub(super) displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
     /// The maximum penetration at an edge of each triangle at any time, m.
-    depths: Vec<f64>,
+    pub(super) depths: Vec<f64>,
     /// The times at which steps end, s.
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
 }
 
 impl<'a> FewStepRun<'a> {
@@ -88,30 +88,10 @@ impl<'a> FewStepRun<'a> {
         [body.vertices.partition.min_max(&done).1, body.mean(&done)].map(|damage| damage.max(0.0))
     }
 
-    /// The maximum |u| at any time, m.
-    pub(super) fn displacement(&self) -> f64 {
-        self.history.displacement
-    }
-
-    /// The maximum penetration at an edge of each triangle at any time, m.
-    pub(super) fn depths(&self) -> &[f64] {
-        &self.history.depths
-    }
-
     /// The scales of the figures. An extreme that is `unsettled` is no scale of the others.
     pub(super) fn scales(&self, unsettled: &[String]) -> Vec<f64> {
         let (sizes, forces) = (self.outcome.sizes(self.problem), self.outcome.last.forces);
         self.problem.figure_scales(&sizes, unsettled, self.history.energy, forces)
-    }
-
-    /// The times at which steps end, s.
-    pub(super) fn times(&self) -> &[f64] {
-        &self.history.times
-    }
-
-    /// All figures at the end.
-    pub(super) fn values(&self) -> &[Value] {
-        &self.outcome.last.figures
     }
 
     /// The length of the part of Γ_C on which the ends of contact may lie, m: half of an edge for each end.
@@ -205,9 +185,9 @@ impl Answer {
         Self {
             mesh,
             zeta,
-            times: run.times().to_vec(),
+            times: run.history.times.clone(),
             error,
-            values: run.values().iter().map(|of| of.value).collect(),
+            values: run.outcome.last.figures.iter().map(|of| of.value).collect(),
             open: run.open_length(),
             stop: run.stop(),
         }
@@ -270,6 +250,6 @@ fn gathered(problem: &ObservedProblem, own: &[f64], count: usize) -> Vec<f64> {
     let mut values = vec![0.0; count];
     let own = body.global_triangles.iter().zip(own).take(body.own_triangles);
     own.for_each(|(&triangle, value)| values[triangle] = *value);
-    body.nodes.partition.comm().sum(&mut values);
+    body.comm().sum(&mut values);
     values
 }

@@ -93,7 +93,7 @@ impl<'a> Extremes<'a> {
         let points = nodal.points.iter().filter(|of| of.ends.iter().any(|end| next.contains(end)));
         let places = Vec::from_iter(points.map(|point| point.at));
         for of in &mut self.all {
-            let is_there = body.nodes.partition.comm().any(places.contains(&of.at));
+            let is_there = body.comm().any(places.contains(&of.at));
             if is_there && !self.problem.figures[of.number].is_pressure() {
                 of.unresolved = Some("a jump of a load".to_owned());
             }
@@ -212,6 +212,6 @@ impl<'a> Extremes<'a> {
             point.at == at && material.is_none_or(|(number, _)| *number == point.material)
         });
         let own = there.map(|(stress, _)| von_mises(*stress)).fold(f64::NEG_INFINITY, f64::max);
-        problem.body.nodes.partition.comm().max(own)
+        problem.body.comm().max(own)
     }
 }

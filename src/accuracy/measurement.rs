@@ -116,7 +116,8 @@ impl Measurement {
         let finer = Refinement::start(answer.mesh.clone()).refine_everywhere()?;
         let triangles = finer.mesh.triangles.len();
         let of_fine = problem(&finer.mesh)?;
-        let run = || FewStepRun::run(session, &of_fine, choices, triangles, FEW, coarse.times());
+        let run =
+            || FewStepRun::run(session, &of_fine, choices, triangles, FEW, &coarse.history.times);
         let failed = |source| AdaptError::Run { triangles, source };
         let fine = limits.measure(triangles, run).map_err(failed)?;
         let mut answers = vec![Answer::new(&fine, finer.mesh.clone())];
@@ -138,7 +139,8 @@ impl Measurement {
         }
         let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
         let problem = problem(&finest)?;
-        let run = || FewStepRun::run(session, &problem, choices, triangles, FEW, coarse.times());
+        let run =
+            || FewStepRun::run(session, &problem, choices, triangles, FEW, &coarse.history.times);
         if let Ok(run) = limits.measure(triangles, run) {
             answers.push(Answer::new(&run, finest));
             measured.set_bars(&Sequence::new(before, answer, &answers, true), coarse, &fine);
@@ -191,7 +193,7 @@ impl Measurement {
         measured.shares = vec![0.0; answer.mesh.triangles.len()];
         measured.depths = measured.shares.clone();
         for ((&parent, share), depth) in
-            finer.parent_of_triangle.iter().zip(of_parts).zip(fine.depths())
+            finer.parent_of_triangle.iter().zip(of_parts).zip(&fine.history.depths)
         {
             measured.shares[parent] += growth * share;
             measured.depths[parent] = measured.depths[parent].max(*depth);
@@ -224,7 +226,7 @@ impl Measurement {
         let problem = fine.problem;
         // The extreme of the whole settles if that of its part does.
         let settles = |extreme: &&Extreme| {
-            let part = problem.part_of(extreme.number, fine.values());
+            let part = problem.part_of(extreme.number, &fine.outcome.last.figures);
             let part = self.of_points.iter().find(|of| of.number == part).unwrap_or(extreme);
             sequence.settles(part.number, part)
         };
@@ -244,7 +246,7 @@ impl Measurement {
         let Measured { bars, unsettled, .. } = &mut self.result;
         *bars = problem.bars(&errors, &coarse.scales(unsettled));
         bars.retain(|bar| !unsettled.contains(&bar.name));
-        problem.join_bars(bars, coarse.values());
+        problem.join_bars(bars, &coarse.outcome.last.figures);
     }
 
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.

@@ -51,7 +51,7 @@ impl ObservedProblem {
                 }
             }
         }
-        let all = self.body.nodes.partition.comm().gather(own.as_flattened());
+        let all = self.body.comm().gather(own.as_flattened());
         let penetration = |&[triangle, depth, x, y, boundary]: &[f64; 5]| Penetration {
             triangle: triangle as usize,
             depth,

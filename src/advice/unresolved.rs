@@ -60,7 +60,7 @@ pub(crate) fn unresolved(
         let weighted = state.zeta.iter().zip(&problem.body.vertices.weights);
         let own = weighted.take(problem.body.vertices.partition.owned());
         let damage = own.map(|(zeta, weight)| weight * (1.0 - zeta).powi(2)).sum();
-        let damage = problem.body.vertices.partition.comm().total(damage);
+        let damage = problem.body.comm().total(damage);
         let allowed = (INTERPOLATION_SHARE * accuracy).powi(2) * damage / part;
         let mut largest: Vec<_> = missed.squares.iter().copied().enumerate().collect();
         largest.sort_by(|(_, a), (_, b)| b.total_cmp(a));

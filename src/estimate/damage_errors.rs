@@ -37,6 +37,6 @@ pub(super) fn displacement_error_of(
         sums[0] += energy * (error / zeta.max(zeta + error)).powi(2).min(1.0);
         sums[1] += energy;
     }
-    body.nodes.partition.comm().sum(&mut sums);
+    body.comm().sum(&mut sums);
     if sums[1] == 0.0 { 0.0 } else { (sums[0] / sums[1]).sqrt() }
 }

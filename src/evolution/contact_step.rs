@@ -123,7 +123,7 @@ impl<'a> ContactStep<'a> {
         choices: &Choices,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
-        let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
+        let (comm, unknowns) = (body.comm(), 2 * body.nodes.partition.owned());
         let stiffness = stage("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
@@ -171,7 +171,7 @@ impl<'a> ContactStep<'a> {
         let started = Instant::now();
         let problem = self.problem;
         self.set_damage(zeta);
-        let comm = problem.body.nodes.partition.comm();
+        let comm = problem.body.comm();
         let case = agreed(comm, stage("loads", || problem.load_case(time)))?;
         let mut attempt = self.first_attempt(0, &case)?;
         let candidate = loop {
@@ -202,7 +202,7 @@ impl<'a> ContactStep<'a> {
     fn set_damage(&mut self, zeta: &[f64]) {
         let problem = self.problem;
         let zeta_at_points = problem.zeta_at_points(zeta);
-        if problem.body.nodes.partition.comm().any(zeta_at_points != self.zeta_at_points) {
+        if problem.body.comm().any(zeta_at_points != self.zeta_at_points) {
             stage("stiffness", || {
                 self.stiffness.set_damage(&problem.body, &zeta_at_points);
             });
@@ -242,7 +242,7 @@ impl<'a> ContactStep<'a> {
         let u = next.reference.total(u);
         self.next = next;
         let mut state = State { time, u, zeta: zeta.to_vec(), contact, prescribed };
-        problem.share_reactions(&mut state, &unbalanced, rounding);
+        state.prescribed = problem.pressed(&state, &unbalanced, rounding);
         let (observation, figures) =
             stage("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
         let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);
@@ -282,7 +282,7 @@ impl<'a> ContactStep<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
+        let (problem, comm) = (self.problem, self.problem.body.comm());
         let mut c = self.c.read(<[f64]>::to_vec)?;
         self.next.reference.translate(&problem.constraints, &mut c, 1.0);
         stage("extrapolation", || self.extrapolation.accept(comm, time, c));
@@ -306,7 +306,7 @@ impl<'a> ContactStep<'a> {
     /// The first attempt by a solver: sets c, the reference and the warm start, all from the accepted steps. If the active
     /// bounds do not support the body, the load drives it as a rigid body until contact, and the reference follows.
     fn first_attempt(&mut self, solver: usize, case: &LoadCase) -> Result<Attempt, PetscError> {
-        let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
+        let (problem, comm) = (self.problem, self.problem.body.comm());
         let constraints = &problem.constraints;
         let mut next = self.accepted.clone();
         let unloaded =

@@ -156,7 +156,7 @@ impl Run<'_> {
     /// Reports the last accepted step to the observer. Then the run goes on, keeps a checkpoint or ends, as the
     /// observers of all ranks decide. Collective.
     fn report(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
-        let comm = self.damage_step.problem.body.nodes.partition.comm();
+        let comm = self.damage_step.problem.body.comm();
         let wanted = observer.accept(&self.outcome.last).map_err(RunError::Observer);
         let next = Next::of_urgency(comm.max(agreed(comm, wanted)?.urgency()));
         if next != Next::Step {

@@ -133,7 +133,7 @@ impl StepRecord {
             displacement_max: observation.displacement_max.value,
             work: observation.work,
             contact_force: observation.contact_force,
-            active_nodes: problem.body.nodes.partition.comm().count(active.len()),
+            active_nodes: problem.body.comm().count(active.len()),
             iterations: report.iterations,
             linear_iterations: report.linear_iterations,
             factorisations: report.factorisations,

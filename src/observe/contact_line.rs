@@ -242,7 +242,7 @@ impl ContactLine {
             self.shares(point, state.time).into_iter().map(of)
         };
         let own: Vec<Reaction> = state.of_contact().flat_map(reactions).collect();
-        let all = body.nodes.partition.comm().gather(own.as_flattened());
+        let all = body.comm().gather(own.as_flattened());
         let mut all: Vec<Reaction> = all.as_chunks().0.to_vec();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
         all
@@ -290,7 +290,7 @@ impl ContactLine {
             let ContactRow { x, y, .. } = line_nodes[0].row;
             (line_nodes.map(|of| of.boundary), [x, y], [nx, ny])
         };
-        let is_first = body.nodes.partition.comm().rank() == 0;
+        let is_first = body.comm().rank() == 0;
         self.moved(&all).map(of).filter(|_| is_first).collect()
     }
 

@@ -58,7 +58,7 @@ impl ObservedProblem {
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += length * value);
             }
         }
-        self.body.nodes.partition.comm().sum(sums.as_flattened_mut());
+        self.body.comm().sum(sums.as_flattened_mut());
         let mean = |[x, y, travel, length]: [f64; 4]| MeanDisplacement {
             displacement: [x / length, y / length],
             travel: travel / length,

@@ -149,7 +149,7 @@ impl ObservedProblem {
                 }
             }
         }
-        let comm = body.nodes.partition.comm();
+        let comm = body.comm();
         let extremes = |parts: &[[(f64, [f64; 2]); 3]]| {
             let [von_mises, most, least] =
                 [0, 1, 2].map(|k| greatest(comm, parts.iter().map(|part| part[k])));

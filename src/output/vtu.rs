@@ -69,7 +69,7 @@ impl FieldWriter {
     /// # Errors
     /// The names of the columns of `contact.csv` cannot be written.
     pub fn new(folder: &Path, problem: &ObservedProblem) -> Result<Self, OutputError> {
-        let comm = problem.body.nodes.partition.comm();
+        let comm = problem.body.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
         let stress = Arc::clone(problem.nodal_stress());
         let kind = match problem.body.elements() {
@@ -122,11 +122,11 @@ impl FieldWriter {
         // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
         let (contact, pressures) = problem.supports.contact.rows(&problem.body, state);
         if problem.scene().output.every == Some(0) {
-            let is_root = problem.body.nodes.partition.comm().is_root();
+            let is_root = problem.body.comm().is_root();
             let rows = if is_root { &contact[..] } else { &[] };
             return self.contact.add(&contact_file, state.time, rows);
         }
-        let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
+        let (cells, comm) = (cell_data(problem, state), problem.body.comm());
         let failed = |error| OutputError::new(Path::new("a frame"), error);
         let mut points = point_data(problem, &self.stress, state, &pressures).map_err(failed)?;
         let strained = NodalStress::strained(problem, state);

@@ -188,7 +188,7 @@ impl DiscreteProblem {
     /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
     pub(super) fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
         let load = self.load(time);
-        if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
+        if !self.body.comm().all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
         let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };

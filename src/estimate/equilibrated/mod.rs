@@ -195,7 +195,7 @@ impl<'a> EquilibratedStress<'a> {
     pub fn improve(&mut self) {
         let Self { triangles, stars, boundary, tractions, .. } = self;
         let body = &self.problem.body;
-        let (comm, known) = (body.nodes.partition.comm(), (&triangles[..], &stars[..], &*boundary));
+        let (comm, known) = (body.comm(), (&triangles[..], &stars[..], &*boundary));
         let mut improve = |is_wanted: &dyn Fn(&Star) -> bool, part: f64| {
             let before = (!comm.is_serial()).then(|| tractions.clone());
             let (linear, quadratic) = (&composite::LINEAR, &composite::QUADRATIC);
@@ -228,13 +228,13 @@ impl<'a> EquilibratedStress<'a> {
                 Order::Quadratic => composite::QUADRATIC.square(&triangle),
             }
         };
-        body.nodes.partition.comm().total((0..body.own_triangles).map(square).sum())
+        body.comm().total((0..body.own_triangles).map(square).sum())
     }
 
     /// The bound on ‖u − u_h‖ / ‖u_h‖ for the `square` of τ. Collective.
     fn bound(&self, square: f64) -> f64 {
         let contact = 2.0 * self.edges.iter().map(ContactEdge::work).sum::<f64>();
-        let contact = self.problem.body.nodes.partition.comm().total(contact);
+        let contact = self.problem.body.comm().total(contact);
         ((square + contact).sqrt() + self.of_moved) / self.norm
     }
 
@@ -391,7 +391,7 @@ fn boundary(
 
 /// The sum of the parts of the forces that all ranks have. Collective.
 fn summed(body: &Body, parts: Vec<SideForces>) -> Vec<SideForces> {
-    let comm = body.nodes.partition.comm();
+    let comm = body.comm();
     if comm.is_serial() {
         return parts;
     }

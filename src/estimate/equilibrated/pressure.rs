@@ -108,7 +108,7 @@ impl Foundation {
         });
         let edges = Vec::from_iter(edges);
         // The first rank counts the rows.
-        let is_first = body.nodes.partition.comm().is_root();
+        let is_first = body.comm().is_root();
         let force = |row: &ContactRow| {
             ([row.x, row.y], -row.force * Vector2::new(row.normal_x, row.normal_y))
         };
@@ -277,7 +277,7 @@ pub(super) fn balance(
             target +=
                 DVector::from_iterator(3, all.iter().map(|m| force.dot(&Vector2::from(m.at(*at)))));
         }
-        body.nodes.partition.comm().sum(target.as_mut_slice());
+        body.comm().sum(target.as_mut_slice());
         scale(problem, &mut edges.iter_mut().collect::<Vec<_>>(), &all, &target);
     }
     let target = -problem.motions.work(body, |i| [load[2 * i], load[2 * i + 1]]);
@@ -295,7 +295,7 @@ fn scale(
 ) -> bool {
     /// In each round but the last one some p becomes 0. Bodies that need more rounds have no bound.
     const TIMES: usize = 10;
-    let (comm, count) = (problem.body.nodes.partition.comm(), motions.len());
+    let (comm, count) = (problem.body.comm(), motions.len());
     // ν·m at the place `at`, with ν of the place k of an edge.
     let along = |edge: &ContactEdge, k: usize, at: [f64; 2]| {
         DVector::from_fn(count, |i, _| edge.normals[k].dot(&Vector2::from(motions[i].at(at))))

@@ -133,7 +133,7 @@ impl<'a> ContactStep<'a> {
         load.set(&forces[..load.owned()])?;
         c.write(|u| u.fill(0.0))?;
         stiffness.set_damage(body, zeta);
-        let comm = body.nodes.partition.comm();
+        let comm = body.comm();
         let system = LinearSystem {
             prescribed: comm.any(!held.is_empty()).then_some(held),
             scale: stiffness.scale,
@@ -147,7 +147,7 @@ impl<'a> ContactStep<'a> {
     /// Bounded unknowns that prevent the motions which contact alone prevents, one for each: the largest pivots of Gaussian
     /// elimination on their u·ν, in increasing order. Collective.
     pub(crate) fn holding(&self) -> Vec<usize> {
-        let (comm, mut rows) = (self.problem.body.nodes.partition.comm(), self.rigid.clone());
+        let (comm, mut rows) = (self.problem.body.comm(), self.rigid.clone());
         let mut held = Vec::new();
         for k in 0..rows.ncols() {
             let size = |i: &usize| rows[(*i, k)].abs();

@@ -133,7 +133,7 @@ impl ContactStep<'_> {
         error: ContactError,
         case: &LoadCase,
     ) -> Result<Decision, PetscError> {
-        let (comm, next) = (self.problem.body.nodes.partition.comm(), attempt.solver + 1);
+        let (comm, next) = (self.problem.body.comm(), attempt.solver + 1);
         if next < self.solvers.len() && error.may_be_rescued(comm) {
             let first = self.first_attempt(next, case)?;
             return Ok(Decision::Again(Attempt { rescued: Some(error), ..first }));

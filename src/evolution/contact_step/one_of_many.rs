@@ -13,7 +13,7 @@ impl ContactStep<'_> {
     /// The rigid motions that only contact constrains and no contact force above `level` times F resists.
     fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
         let active = active_bounds(&self.problem.constraints, contact, level * force);
-        let comm = self.problem.body.nodes.partition.comm();
+        let comm = self.problem.body.comm();
         contact::unconstrained_motions(comm, &self.rigid, &active)
     }
 
@@ -54,7 +54,7 @@ impl ContactStep<'_> {
             let total = next.reference.total(candidate.u.clone());
             let amplitudes = problem.motions.amplitudes(&problem.body, &total);
             let (bounds, c) = self.at_bounds(&next.reference, case)?;
-            let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
+            let (comm, motions) = (problem.body.comm(), (&self.rigid, &left[..]));
             let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
                 break;
             };

@@ -153,15 +153,6 @@ impl Figure {
     }
 }
 
-/// The parts of a scene that have figures of their own, by their names.
-struct Parts<'a> {
-    /// The materials, if there are several.
-    materials: Vec<&'a str>,
-    /// The boundaries with a table.
-    boundaries: Vec<PartOfBoundary<'a>>,
-    probes: Vec<&'a str>,
-}
-
 /// A boundary with a table.
 struct PartOfBoundary<'a> {
     name: &'a str,
@@ -200,15 +191,14 @@ impl Figures {
             foundation: number(&problem.foundations, &of.name),
             moves: of.gap().is_some_and(|gap| gap.distance.depends_on_time()),
         });
-        Self::new(&Parts {
-            materials: several.iter().map(|(_, name)| &**name).collect(),
-            boundaries: boundaries.collect(),
-            probes: problem.scene().probes.iter().map(|probe| &*probe.name).collect(),
-        })
+        let materials = several.iter().map(|(_, name)| name.as_str());
+        let probes = problem.scene().probes.iter().map(|probe| probe.name.as_str());
+        Self::new(&Vec::from_iter(materials), &Vec::from_iter(boundaries), &Vec::from_iter(probes))
     }
 
-    /// The list of all figures.
-    fn new(parts: &Parts) -> Self {
+    /// The list of all figures: of the body, of these `materials` if there are several, of the `boundaries` with a table and of the
+    /// `probes`.
+    fn new(materials: &[&str], boundaries: &[PartOfBoundary], probes: &[&str]) -> Self {
         use Dimension::{
             ContactLength, Force, Given, Length, Moment, OfZeta, Place, Stress, Work, Zeta,
         };
@@ -225,7 +215,7 @@ impl Figures {
             ("principal_max", "largest σ₁@", Stress, Largest),
             ("principal_min", "smallest σ₂@", Stress, Least),
         ];
-        let materials = parts.materials.iter().map(|name| Of::Material((*name).to_owned()));
+        let materials = materials.iter().map(|name| Of::Material((*name).to_owned()));
         for (i, of) in iter::once(Of::Body).chain(materials).enumerate() {
             all.add(&of, stresses, move |of, k| of.stresses[i][k]);
         }
@@ -233,12 +223,12 @@ impl Figures {
             ("pressure_max", "largest contact pressure@", Stress, Largest),
             ("contact_length", "length of contact@", ContactLength, Largest),
         ];
-        if parts.boundaries.iter().any(|of| of.foundation.is_some()) {
+        if boundaries.iter().any(|of| of.foundation.is_some()) {
             let force = ("contact_force", "sum of contact reactions", Force, Largest);
             all.add(&body, [force], |of, _| of.contact_force.into());
             all.add(&body, contact, |of, k| of.contact[0].values[k]);
         }
-        for (i, boundary) in parts.boundaries.iter().enumerate() {
+        for (i, boundary) in boundaries.iter().enumerate() {
             let of = Of::Boundary(boundary.name.to_owned());
             if let Some(support) = boundary.support {
                 let resultants = [
@@ -253,7 +243,7 @@ impl Figures {
                 ("u_y", "mean displacement@, y", Length, LargestModulus),
             ];
             // A probe of the same name has these figures.
-            if !parts.probes.contains(&boundary.name) {
+            if !probes.contains(&boundary.name) {
                 all.add(&of, means, move |of, k| of.means[i].displacement[k].into());
             }
             if boundary.moves {
@@ -277,7 +267,7 @@ impl Figures {
                 all.add(&of, places, move |of, k| value(of, k).into());
             }
         }
-        for (i, name) in parts.probes.iter().enumerate() {
+        for (i, name) in probes.iter().enumerate() {
             let observed = [
                 ("u_x", "displacement@, x", Length, LargestModulus),
                 ("u_y", "displacement@, y", Length, LargestModulus),
@@ -297,11 +287,7 @@ impl Figures {
     pub fn of_any_scene() -> Self {
         let [support, foundation] = [Some(0); 2];
         let boundary = PartOfBoundary { name: "BOUNDARY", support, foundation, moves: true };
-        Self::new(&Parts {
-            materials: vec!["MATERIAL"],
-            boundaries: vec![boundary],
-            probes: vec!["PROBE"],
-        })
+        Self::new(&["MATERIAL"], &[boundary], &["PROBE"])
     }
 
     /// Adds several figures of one part. Each has a kind, a label in which @ stands for the name of the part, a dimension, and which
