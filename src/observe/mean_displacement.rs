@@ -13,15 +13,6 @@ use std::collections::BTreeMap;
 #[derive(Debug)]
 pub(super) struct Means(Vec<BTreeMap<usize, f64>>);
 
-/// The motion of a boundary and of its foundation.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct MeanDisplacement {
-    /// ∫u/|Γ| of the boundary Γ, m.
-    pub displacement: [f64; 2],
-    /// ∫(g(x, 0) − g(x, t))/|Γ|: how far the foundation has moved towards the body, m; 0 without one.
-    pub travel: f64,
-}
-
 impl Means {
     pub(super) fn new(scene: &Scene, body: &Body, lines: &Lines) -> Self {
         let of_boundary = |name: &String| {
@@ -43,8 +34,9 @@ impl Means {
 }
 
 impl ObservedProblem {
-    /// The mean displacements of the boundaries with a table. Collective.
-    pub(super) fn mean_displacements(&self, state: &State) -> Vec<MeanDisplacement> {
+    /// Per boundary Γ with a table: ∫u/|Γ|, and ∫(g(x, 0) − g(x, t))/|Γ|, how far the foundation has moved towards the body; 0
+    /// without one, m. Collective.
+    pub(super) fn mean_displacements(&self, state: &State) -> Vec<[f64; 3]> {
         let mut sums = vec![[0.0; 4]; self.means.0.len()];
         for ((lengths, boundary), sums) in
             self.means.0.iter().zip(&self.scene().boundaries).zip(&mut sums)
@@ -59,10 +51,7 @@ impl ObservedProblem {
             }
         }
         self.body.comm().sum(sums.as_flattened_mut());
-        let mean = |[x, y, travel, length]: [f64; 4]| MeanDisplacement {
-            displacement: [x / length, y / length],
-            travel: travel / length,
-        };
+        let mean = |[x, y, travel, length]: [f64; 4]| [x, y, travel].map(|sum| sum / length);
         sums.into_iter().map(mean).collect()
     }
 }

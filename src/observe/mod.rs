@@ -1,12 +1,12 @@
-//! What is read from a state: figures with their places, contact along its line, forces of supports, stresses.
+//! Quantities read from a state: figures with their places, contact along its line, forces of supports, stresses.
 //!
-//! - [`ObservedProblem`]: a discrete problem with everything that a run reads from its states;
+//! - [`ObservedProblem`]: a discrete problem with the figures, supports and probes that a run reads from its states;
 //! - [`Figures`]: the list of all printed numbers; [`Bar`]: the error bar of such a number;
 //! - [`Supports`] with the [`ContactLine`]: resultants, and the rows of `contact.csv`;
 //! - [`NodalStress`]: continuous stresses, for extremes and pictures.
 //!
-//! What crosses the door: `evolution` observes each step, and `output` writes what is observed. Nothing here changes a state, but
-//! [`Supports`] divide the reactions at a node between boundaries.
+//! What crosses the door: `evolution` observes each step, and `output` writes fields and rows of contact. Nothing here changes a
+//! state. [`Supports`] divide the reaction at a node between boundaries.
 
 mod contact_figures;
 mod contact_line;
@@ -30,14 +30,14 @@ use crate::{
     problem::{DiscreteProblem, SetupError},
     scene::Scene,
 };
-use mean_displacement::{MeanDisplacement, Means};
+use mean_displacement::Means;
 use probe::Probes;
 use std::{
     ops::{Deref, DerefMut},
     sync::{Arc, OnceLock},
 };
 
-/// A discrete problem, and what is read from its states. It has all that a [`DiscreteProblem`] has.
+/// A discrete problem with its figures, supports and probes. It dereferences to the [`DiscreteProblem`].
 #[derive(Debug)]
 pub struct ObservedProblem {
     problem: DiscreteProblem,

@@ -7,8 +7,8 @@
 //!   narrow load is overlooked (`LoadCase`: their values at one time);
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
-//! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]. The room
-//! [`observe`](crate::observe) reads states, and [`advice`](crate::advice) finds what the user should know; this room uses neither.
+//! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]. The rooms
+//! [`observe`](crate::observe) and [`advice`](crate::advice) read the problem and its states; this room uses neither.
 //! Bad input is a [`SetupError`].
 
 mod boundary_conditions;

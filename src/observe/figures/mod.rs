@@ -244,11 +244,11 @@ impl Figures {
             ];
             // A probe of the same name has these figures.
             if !probes.contains(&boundary.name) {
-                all.add(&of, means, move |of, k| of.means[i].displacement[k].into());
+                all.add(&of, means, move |of, k| of.means[i][k].into());
             }
             if boundary.moves {
                 let travel = ("travel", "travel of the foundation@", Given, LargestModulus);
-                all.add(&of, [travel], move |of, _| of.means[i].travel.into());
+                all.add(&of, [travel], move |of, _| of.means[i][2].into());
             }
             if let Some(foundation) = boundary.foundation {
                 all.add(&of, contact, move |of, k| of.contact[1 + foundation].values[k]);
