@@ -31,6 +31,7 @@ pub(super) struct FewStepRun<'a> {
 }
 
 /// The figures and the estimated errors of the steps of a run.
+#[derive(Default)]
 pub(super) struct History {
     /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
@@ -50,17 +51,16 @@ pub(super) struct History {
 }
 
 impl<'a> FewStepRun<'a> {
-    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at about `instants` times. Adaptive steps end at
+    /// Runs `problem`, with estimates at about `instants` times. Adaptive steps end at
     /// the times `followed` of the run with which this one is compared. Collective.
     pub(super) fn run(
         session: &Session,
         problem: &'a ObservedProblem,
         choices: &Choices,
-        triangles: usize,
         instants: usize,
         followed: &[f64],
     ) -> Result<Self, RunError> {
-        let mut history = History::new(instants, triangles);
+        let mut history = History::new(instants, problem.mesh().triangles.len());
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
         let run = all_steps(session, problem, choices, &mut observe, None, followed)?;
         let outcome = run.outcome;
@@ -111,7 +111,7 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn zeta(&self) -> [Vec<f64>; 3] {
         let (triangles, zeta) = (&self.problem.body.mesh.triangles, &self.outcome.last.state.zeta);
         let own = |i: usize| triangles.iter().map(|nodes| zeta[nodes[i]]).collect::<Vec<_>>();
-        [0, 1, 2].map(|i| self.gathered(&own(i)))
+        [0, 1, 2].map(|i| gathered(self.problem, &own(i)))
     }
 
     /// ε(u) at the end at the vertices of each triangle of this rank.
@@ -127,7 +127,7 @@ impl<'a> FewStepRun<'a> {
         let mut strains = vec![[Vector3::zeros(); 3]; self.history.squares.len()];
         for (i, component) in (0..3).flat_map(|i| (0..3).map(move |component| (i, component))) {
             let values = Vec::from_iter(own.iter().map(|strains| strains[i][component]));
-            let values = self.gathered(&values);
+            let values = gathered(self.problem, &values);
             strains.iter_mut().zip(values).for_each(|(of, value)| of[i][component] = value);
         }
         strains
@@ -137,11 +137,6 @@ impl<'a> FewStepRun<'a> {
     /// not be exact.
     pub(super) fn energy(&self) -> f64 {
         self.history.end.2.max(UNLOADED.powi(2) * self.history.energy)
-    }
-
-    /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
-    pub(super) fn gathered(&self, own: &[f64]) -> Vec<f64> {
-        gathered(self.problem, own, self.history.squares.len())
     }
 
     /// The relative error of u at the worst time, and the shares m_T of its square.
@@ -196,17 +191,8 @@ impl Answer {
 
 impl History {
     fn new(instants: usize, triangles: usize) -> Self {
-        Self {
-            instants,
-            last: None,
-            squares: vec![0.0; triangles],
-            worst: 0.0,
-            energy: 0.0,
-            displacement: 0.0,
-            end: Default::default(),
-            depths: vec![0.0; triangles],
-            times: Vec::new(),
-        }
+        let (squares, depths) = (vec![0.0; triangles], vec![0.0; triangles]);
+        Self { instants, squares, depths, ..Self::default() }
     }
 
     /// Records an accepted step. Collective.
@@ -235,7 +221,7 @@ impl History {
         let state = &problem.strained(state);
         let recovered = RecoveredStrains::new(body, &state.u)?;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
-        let squares = gathered(problem, &error.squares, self.squares.len());
+        let squares = gathered(problem, &error.squares);
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
         self.end = (squares, error.error, error.energy);
         self.worst = self.worst.max(error.error);
@@ -244,10 +230,10 @@ impl History {
     }
 }
 
-/// Values of this rank's triangles for all `count` triangles of the undivided mesh. Collective.
-fn gathered(problem: &ObservedProblem, own: &[f64], count: usize) -> Vec<f64> {
+/// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
+fn gathered(problem: &ObservedProblem, own: &[f64]) -> Vec<f64> {
     let body = &problem.body;
-    let mut values = vec![0.0; count];
+    let mut values = vec![0.0; problem.mesh().triangles.len()];
     let own = body.global_triangles.iter().zip(own).take(body.own_triangles);
     own.for_each(|(&triangle, value)| values[triangle] = *value);
     body.comm().sum(&mut values);

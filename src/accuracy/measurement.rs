@@ -7,15 +7,15 @@
 //! large, or if its time steps differ, this mesh is bisected itself.
 
 use super::{
-    AdaptError, Answer, End, Extreme, FEW, FewStepRun, Limits, Measured,
+    AccuracyLoop, AdaptError, Answer, End, Extreme, FEW, FewStepRun, Measured,
     changes::{damage, displacement},
+    problem_on,
     sequence::Sequence,
 };
 use crate::{
-    evolution::{AIM, Choices},
-    mesh::{Mesh, Order, Refinement},
+    evolution::AIM,
+    mesh::{Order, Refinement},
     observe::{Dimension, Figure, ObservedProblem, Of},
-    petsc::Session,
     scene::Probe,
 };
 use std::slice::from_ref;
@@ -92,62 +92,53 @@ pub(super) struct Measurement {
     finer: Option<(Refinement, Answer)>,
 }
 
-impl Measurement {
+impl AccuracyLoop<'_> {
     /// Measures the errors of the run `coarse`, with this `answer`, by the same run on finer meshes, and by the answers on the
-    /// meshes `before`. A mesh bisected twice is left out if it exceeds the `limits`, and if two meshes show already whether the
+    /// meshes before. A mesh bisected twice is left out if it exceeds the limits, and if two meshes show already whether the
     /// `accuracy` is reached. Collective.
     ///
     /// # Errors
     /// A triangle cannot be bisected, or the run on the finer mesh fails.
-    pub(super) fn new(
-        session: &Session,
+    pub(super) fn measurement(
+        &mut self,
         answer: &Answer,
         coarse: &FewStepRun,
-        choices: &Choices,
-        before: &[Answer],
         accuracy: Option<f64>,
-        limits: &mut Limits,
-    ) -> Result<Self, AdaptError> {
-        let scene = coarse.problem.scene();
-        let problem = |mesh: &Mesh| {
-            let problem = ObservedProblem::new(scene.clone(), mesh.clone())?;
-            problem.restrict(session).map_err(AdaptError::from)
-        };
+    ) -> Result<Measurement, AdaptError> {
+        let (scene, times) = (coarse.problem.scene(), &coarse.history.times);
         let finer = Refinement::start(answer.mesh.clone()).refine_everywhere()?;
-        let triangles = finer.mesh.triangles.len();
-        let of_fine = problem(&finer.mesh)?;
-        let run =
-            || FewStepRun::run(session, &of_fine, choices, triangles, FEW, &coarse.history.times);
-        let failed = |source| AdaptError::Run { triangles, source };
-        let fine = limits.measure(triangles, run).map_err(failed)?;
+        let of_fine = problem_on(self.session, scene, &finer.mesh)?;
+        let fine = self.solve(&of_fine, FEW, times)?;
         let mut answers = vec![Answer::new(&fine, finer.mesh.clone())];
-        let two = Sequence::new(before, answer, &answers, true);
-        let mut measured = Self::of_fields(&two, &finer, [answer, &answers[0]], coarse, &fine);
+        let two = Sequence::new(&self.before, answer, &answers, true);
+        let both = [answer, &answers[0]];
+        let mut measured = Measurement::of_fields(&two, &finer, both, coarse, &fine);
         measured.set_bars(&two, coarse, &fine);
-        let misses = |measured: &Self| {
+        let misses = |measured: &Measurement| {
             accuracy.is_some_and(|accuracy| measured.excess(accuracy, &scene.accuracy_of) > 1.0)
         };
         let is_done = two.has_coarser() || misses(&measured);
         if !is_done {
             measured.set_bars(&two.slower(), coarse, &fine);
         }
-        let triangles = 4 * triangles;
+        let triangles = 4 * finer.mesh.triangles.len();
         let is_decided = accuracy.is_some() && triangles > CHEAP && !misses(&measured);
-        if is_done || is_decided || limits.exceeded(&[triangles]).is_some() {
+        if is_done || is_decided || self.limits.exceeded(&[triangles]).is_some() {
             measured.finer = answers.pop().map(|fine| (finer, fine));
             return Ok(measured);
         }
         let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
-        let problem = problem(&finest)?;
-        let run =
-            || FewStepRun::run(session, &problem, choices, triangles, FEW, &coarse.history.times);
-        if let Ok(run) = limits.measure(triangles, run) {
+        let problem = problem_on(self.session, scene, &finest)?;
+        if let Ok(run) = self.solve(&problem, FEW, times) {
             answers.push(Answer::new(&run, finest));
-            measured.set_bars(&Sequence::new(before, answer, &answers, true), coarse, &fine);
+            let three = Sequence::new(&self.before, answer, &answers, true);
+            measured.set_bars(&three, coarse, &fine);
         }
         Ok(measured)
     }
+}
 
+impl Measurement {
     /// The errors of the run `coarse` with this `answer` on a refinement of the measured mesh, the last one `before`, from the
     /// same finer mesh. `None` if the time steps differ from those `before`, or if a run stops. Collective.
     pub(super) fn on_refined(
