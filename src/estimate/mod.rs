@@ -36,7 +36,7 @@ pub(crate) const UNLOADED: f64 = 0.01;
 /// Collective.
 fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
     let Run { mut damage_step, mut contact_step, mut controller, mut outcome } = run;
-    let problem = contact_step.problem();
+    let problem = contact_step.problem;
     outcome.accuracy = stage("accuracy", || contact_step.accuracy(&outcome))?;
     outcome.accuracy.energy = stage("accuracy", || energy_error(problem, &outcome))?;
     let state = representative(&outcome).clone();

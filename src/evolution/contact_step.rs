@@ -59,7 +59,7 @@ use std::{ops::RangeInclusive, time::Instant};
 /// Solves the contact problems of a run, one after the other.
 pub struct ContactStep<'a> {
     session: &'a Session,
-    problem: &'a ObservedProblem,
+    pub(crate) problem: &'a ObservedProblem,
     /// The chosen solver, then the one for steps in which it stops short of the tolerance, if there is one.
     solvers: Vec<SharedSolver>,
     /// Solves the linear systems of all solvers.
@@ -181,7 +181,7 @@ impl<'a> ContactStep<'a> {
                     let candidate = stage("certificate", || self.certify(reference, u, &case));
                     self.decide(attempt, stopped, candidate, &case)?
                 }
-                Err(error) => self.give_up(attempt, error, &case)?,
+                Err(error) => self.give_up(attempt, (error, None), &case)?,
             };
             match decision {
                 Decision::Accept(accepted, candidate) => {

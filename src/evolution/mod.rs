@@ -141,7 +141,7 @@ impl Run<'_> {
             Decision::Accept(mut step) => {
                 contact_step.accept(planned.time)?;
                 step.record.seconds = started.elapsed().as_secs_f64();
-                outcome.accept(*step, contact_step.problem());
+                outcome.accept(*step, contact_step.problem);
                 self.report(observer)?;
             }
             Decision::Retry => outcome.rejected += 1,

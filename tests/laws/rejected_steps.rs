@@ -34,7 +34,9 @@ fn zeta(problem: &ObservedProblem, mean: f64) -> Vec<f64> {
 /// and not accepted; the second step.
 fn second_step(problem: &ObservedProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
     let session = Session::start(&[]).unwrap();
-    let mut contact_step = ContactStep::new(&session, problem, &Choices::named(solver)).unwrap();
+    let mut contact_step =
+        ContactStep::new(&session, problem, &Choices::of(problem.scene()).solver_named(solver))
+            .unwrap();
     contact_step.solve(1, 0.9, &zeta(problem, 0.9)).unwrap();
     contact_step.accept(0.9).unwrap();
     for (time, zeta, succeeds) in tries {

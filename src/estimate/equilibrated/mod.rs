@@ -118,7 +118,7 @@ impl<'a> EquilibratedStress<'a> {
         contact_step: &mut ContactStep<'a>,
         state: &State,
     ) -> Result<Result<Self, Unproved>, PetscError> {
-        let problem = contact_step.problem();
+        let problem = contact_step.problem;
         let (body, elasticity) = (&problem.body, &problem.elasticity);
         let (partition, points) = (&body.nodes.partition, problem.zeta_at_points(&state.zeta));
         let comm = partition.comm();

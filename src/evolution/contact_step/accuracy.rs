@@ -2,7 +2,7 @@
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
-    evolution::{DiscreteProblem, ObservedProblem, Outcome, State},
+    evolution::{DiscreteProblem, Outcome, State},
     linear::{LinearSystem, SolveReport},
     petsc::PetscError,
 };
@@ -71,7 +71,7 @@ impl Accuracy {
     }
 }
 
-impl<'a> ContactStep<'a> {
+impl ContactStep<'_> {
     /// After a run: estimates the errors of its last step, relative to the maximum displacement. The step with the
     /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
     /// promised error. The factor of the last solve is usually good enough.
@@ -164,10 +164,5 @@ impl<'a> ContactStep<'a> {
         }
         held.sort_unstable();
         held
-    }
-
-    /// The problem.
-    pub(crate) fn problem(&self) -> &'a ObservedProblem {
-        self.problem
     }
 }

@@ -76,7 +76,8 @@ pub fn solve(
     solver: &str,
     guess: Option<&[f64]>,
 ) -> Result<Result<Step, RunError>, StudyError> {
-    let mut contact_step = ContactStep::new(session, problem, &Choices::named(solver))?;
+    let mut contact_step =
+        ContactStep::new(session, problem, &Choices::of(problem.scene()).solver_named(solver))?;
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }
