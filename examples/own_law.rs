@@ -11,8 +11,8 @@ use signorini::{
     mesh::Mesh,
     model::{DamagePoint, DamageSource},
     nalgebra::{Matrix2, Vector3},
+    observe::ObservedProblem,
     petsc::Session,
-    problem::DiscreteProblem,
     scene::Scene,
 };
 
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let session = Session::start(&[])?;
     let mesh = Mesh::rectangle(1.0, 1.0, 4, 4);
     for (what, traction) in [("pulled", "5"), ("pressed", "-5")] {
-        let problem = DiscreteProblem::new(block(traction)?, mesh.clone())?;
+        let problem = ObservedProblem::new(block(traction)?, mesh.clone())?;
         let own = Simulation::new(&problem).law(Box::new(TensionOnly)).run(&session)?;
         let ours = Simulation::new(&problem).run(&session)?;
         let [own, ours] = [own, ours].map(|outcome| outcome.last.record.zeta_min);
@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = block("5 - 10*x")?;
     let choices = Choices::of(&scene).law(Box::new(TensionOnly));
     let adapted = adapted(&session, &scene, mesh, &choices, 0.05, &mut |_| {})?;
-    let problem = DiscreteProblem::new(scene, adapted.mesh)?;
+    let problem = ObservedProblem::new(scene, adapted.mesh)?;
     let mut outcome = Simulation::new(&problem).choices(&choices).run(&session)?;
     outcome.set_bars(&problem, &adapted.measured)?;
     for (figure, value) in problem.figures.iter().zip(&outcome.last.figures) {

@@ -8,8 +8,8 @@ use signorini::{
     estimate::Simulation,
     linear::LinearSolver,
     mesh::Mesh,
+    observe::ObservedProblem,
     petsc::{Session, Vector},
-    problem::DiscreteProblem,
     scene::Scene,
 };
 
@@ -83,7 +83,7 @@ boundary = [
 /// Runs the scene by both solvers.
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::parse(SCENE, "block.toml".as_ref(), &[])?;
-    let problem = DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, 12, 12))?;
+    let problem = ObservedProblem::new(scene, Mesh::rectangle(1.0, 1.0, 12, 12))?;
     let session = Session::start(&[])?;
     let own = Box::new(ProjectedSor { relaxation: 1.7 });
     let own = Simulation::new(&problem).solver(own).run(&session)?;

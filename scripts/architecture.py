@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "src"
 # The pages about the code, and the folders in which their files may stand: rooms are named without `src`.
-PAGES, FOLDERS = ("ARCHITECTURE.md", "CONTRIBUTING.md"), ("", "src", "src/evolution", "src/problem", "src/problem/figures", "src/scene",
+PAGES, FOLDERS = ("ARCHITECTURE.md", "CONTRIBUTING.md"), ("", "src", "src/evolution", "src/problem", "src/observe", "src/advice", "src/scene",
                                                            "src/fem", "geo")
 
 

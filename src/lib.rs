@@ -10,8 +10,8 @@
 //!     estimate::Simulation,
 //!     evolution::Step,
 //!     mesh::Mesh,
+//!     observe::ObservedProblem,
 //!     petsc::Session,
-//!     problem::DiscreteProblem,
 //!     scene::Scene,
 //! };
 //!
@@ -22,7 +22,7 @@
 //!     boundary = [{ name = 'bottom', gap = 0 }, { name = 'top', pressure = '500*t' }]";
 //! let scene = Scene::parse(text, "square.toml".as_ref(), &[])?;
 //! // Scene::read("file.toml") and mesh::load(&scene.mesh.file, …) read files.
-//! let problem = DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8))?;
+//! let problem = ObservedProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8))?;
 //! let session = Session::start(&[])?;
 //! let mut show = |step: &Step| {
 //!     println!("t = {}: largest |u| = {}", step.record.time, step.record.displacement_max);
@@ -103,6 +103,8 @@ pub mod fem;
 pub mod contact;
 pub mod scene;
 pub mod problem;
+pub mod observe;
+pub mod advice;
 pub mod evolution;
 pub mod estimate;
 pub mod accuracy;

@@ -5,8 +5,9 @@ use crate::{
     estimate::{RecoveredStrains, UNLOADED, at_vertices},
     evolution::{Choices, Outcome, RunError, Step, all_steps},
     mesh::Mesh,
+    observe::ObservedProblem,
     petsc::{PetscError, Session},
-    problem::{DiscreteProblem, State, Value},
+    problem::State,
 };
 use nalgebra::Vector3;
 
@@ -22,15 +23,16 @@ const LARGER: f64 = 1.5;
 
 /// A run with few steps, and its errors on each triangle of the undivided mesh.
 pub(super) struct FewStepRun<'a> {
-    pub(super) problem: &'a DiscreteProblem,
+    pub(super) problem: &'a ObservedProblem,
     pub(super) outcome: Outcome,
     /// The extremes at the end.
     pub(super) extremes: Extremes<'a>,
-    history: History,
+    pub(super) history: History,
 }
 
 /// The figures and the estimated errors of the steps of a run.
-struct History {
+#[derive(Default)]
+pub(super) struct History {
     /// The number of times at which errors are estimated, and the last such time so far, s.
     instants: usize,
     last: Option<f64>,
@@ -39,27 +41,26 @@ struct History {
     worst: f64,
     /// max_t ‖u‖², N m per metre of thickness, and the maximum |u| at any time, m.
     energy: f64,
-    displacement: f64,
+    pub(super) displacement: f64,
     /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
     end: (Vec<f64>, f64, f64),
     /// The maximum penetration at an edge of each triangle at any time, m.
-    depths: Vec<f64>,
+    pub(super) depths: Vec<f64>,
     /// The times at which steps end, s.
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
 }
 
 impl<'a> FewStepRun<'a> {
-    /// Runs `problem` on a mesh of `triangles` triangles, with estimates at about `instants` times. Adaptive steps end at
+    /// Runs `problem`, with estimates at about `instants` times. Adaptive steps end at
     /// the times `followed` of the run with which this one is compared. Collective.
     pub(super) fn run(
         session: &Session,
-        problem: &'a DiscreteProblem,
+        problem: &'a ObservedProblem,
         choices: &Choices,
-        triangles: usize,
         instants: usize,
         followed: &[f64],
     ) -> Result<Self, RunError> {
-        let mut history = History::new(instants, triangles);
+        let mut history = History::new(instants, problem.mesh().triangles.len());
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
         let run = all_steps(session, problem, choices, &mut observe, None, followed)?;
         let outcome = run.outcome;
@@ -87,30 +88,10 @@ impl<'a> FewStepRun<'a> {
         [body.vertices.partition.min_max(&done).1, body.mean(&done)].map(|damage| damage.max(0.0))
     }
 
-    /// The maximum |u| at any time, m.
-    pub(super) fn displacement(&self) -> f64 {
-        self.history.displacement
-    }
-
-    /// The maximum penetration at an edge of each triangle at any time, m.
-    pub(super) fn depths(&self) -> &[f64] {
-        &self.history.depths
-    }
-
     /// The scales of the figures. An extreme that is `unsettled` is no scale of the others.
     pub(super) fn scales(&self, unsettled: &[String]) -> Vec<f64> {
         let (sizes, forces) = (self.outcome.sizes(self.problem), self.outcome.last.forces);
         self.problem.figure_scales(&sizes, unsettled, self.history.energy, forces)
-    }
-
-    /// The times at which steps end, s.
-    pub(super) fn times(&self) -> &[f64] {
-        &self.history.times
-    }
-
-    /// All figures at the end.
-    pub(super) fn values(&self) -> &[Value] {
-        &self.outcome.last.figures
     }
 
     /// The length of the part of Γ_C on which the ends of contact may lie, m: half of an edge for each end.
@@ -130,7 +111,7 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn zeta(&self) -> [Vec<f64>; 3] {
         let (triangles, zeta) = (&self.problem.body.mesh.triangles, &self.outcome.last.state.zeta);
         let own = |i: usize| triangles.iter().map(|nodes| zeta[nodes[i]]).collect::<Vec<_>>();
-        [0, 1, 2].map(|i| self.gathered(&own(i)))
+        [0, 1, 2].map(|i| gathered(self.problem, &own(i)))
     }
 
     /// ε(u) at the end at the vertices of each triangle of this rank.
@@ -146,7 +127,7 @@ impl<'a> FewStepRun<'a> {
         let mut strains = vec![[Vector3::zeros(); 3]; self.history.squares.len()];
         for (i, component) in (0..3).flat_map(|i| (0..3).map(move |component| (i, component))) {
             let values = Vec::from_iter(own.iter().map(|strains| strains[i][component]));
-            let values = self.gathered(&values);
+            let values = gathered(self.problem, &values);
             strains.iter_mut().zip(values).for_each(|(of, value)| of[i][component] = value);
         }
         strains
@@ -156,11 +137,6 @@ impl<'a> FewStepRun<'a> {
     /// not be exact.
     pub(super) fn energy(&self) -> f64 {
         self.history.end.2.max(UNLOADED.powi(2) * self.history.energy)
-    }
-
-    /// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
-    pub(super) fn gathered(&self, own: &[f64]) -> Vec<f64> {
-        gathered(self.problem, own, self.history.squares.len())
     }
 
     /// The relative error of u at the worst time, and the shares m_T of its square.
@@ -204,9 +180,9 @@ impl Answer {
         Self {
             mesh,
             zeta,
-            times: run.times().to_vec(),
+            times: run.history.times.clone(),
             error,
-            values: run.values().iter().map(|of| of.value).collect(),
+            values: run.outcome.last.figures.iter().map(|of| of.value).collect(),
             open: run.open_length(),
             stop: run.stop(),
         }
@@ -215,21 +191,12 @@ impl Answer {
 
 impl History {
     fn new(instants: usize, triangles: usize) -> Self {
-        Self {
-            instants,
-            last: None,
-            squares: vec![0.0; triangles],
-            worst: 0.0,
-            energy: 0.0,
-            displacement: 0.0,
-            end: Default::default(),
-            depths: vec![0.0; triangles],
-            times: Vec::new(),
-        }
+        let (squares, depths) = (vec![0.0; triangles], vec![0.0; triangles]);
+        Self { instants, squares, depths, ..Self::default() }
     }
 
     /// Records an accepted step. Collective.
-    fn observe(&mut self, problem: &DiscreteProblem, step: &Step) -> Result<(), PetscError> {
+    fn observe(&mut self, problem: &ObservedProblem, step: &Step) -> Result<(), PetscError> {
         let time = step.state.time;
         self.times.push(time);
         let end = problem.scene().time.map_or(1.0, |grid| grid.end);
@@ -242,7 +209,7 @@ impl History {
     }
 
     /// Estimates the errors of a state. Collective.
-    fn estimate(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), PetscError> {
+    fn estimate(&mut self, problem: &ObservedProblem, state: &State) -> Result<(), PetscError> {
         let body = &problem.body;
         self.last = Some(state.time);
         self.displacement = self.displacement.max(body.nodes.partition.max_norm(&state.u));
@@ -254,7 +221,7 @@ impl History {
         let state = &problem.strained(state);
         let recovered = RecoveredStrains::new(body, &state.u)?;
         let error = recovered.energy_error(&problem.elasticity, &zeta, &state.u);
-        let squares = gathered(problem, &error.squares, self.squares.len());
+        let squares = gathered(problem, &error.squares);
         self.squares.iter_mut().zip(&squares).for_each(|(max, square)| *max = max.max(*square));
         self.end = (squares, error.error, error.energy);
         self.worst = self.worst.max(error.error);
@@ -263,12 +230,12 @@ impl History {
     }
 }
 
-/// Values of this rank's triangles for all `count` triangles of the undivided mesh. Collective.
-fn gathered(problem: &DiscreteProblem, own: &[f64], count: usize) -> Vec<f64> {
+/// Values of this rank's triangles for all triangles of the undivided mesh. Collective.
+fn gathered(problem: &ObservedProblem, own: &[f64]) -> Vec<f64> {
     let body = &problem.body;
-    let mut values = vec![0.0; count];
+    let mut values = vec![0.0; problem.mesh().triangles.len()];
     let own = body.global_triangles.iter().zip(own).take(body.own_triangles);
     own.for_each(|(&triangle, value)| values[triangle] = *value);
-    body.nodes.partition.comm().sum(&mut values);
+    body.comm().sum(&mut values);
     values
 }

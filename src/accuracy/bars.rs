@@ -3,11 +3,9 @@
 use super::Measured;
 use crate::{
     evolution::{AIM, Outcome},
+    observe::{Bar, Dimension, Figure, NEGLIGIBLE_DAMAGE, Observation, ObservedProblem, Of, Value},
     petsc::PetscError,
-    problem::{
-        Bar, Dimension, DiscreteProblem, Figure, NEGLIGIBLE_DAMAGE, Observation, Of, SAMPLE_TIMES,
-        State, Value,
-    },
+    problem::{SAMPLE_TIMES, State},
 };
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -33,7 +31,7 @@ impl Outcome {
     /// PETSc failed.
     pub fn set_bars(
         &mut self,
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         measured: &Measured,
     ) -> Result<(), PetscError> {
         let unknown = problem.damage().is_some() && self.errors.bars_of_steps.is_none();
@@ -59,7 +57,7 @@ impl Outcome {
     /// The factor for the tolerance of the time steps with which a run is within the required accuracy, if the time steps of
     /// this one take more than the part that the `measured` errors of the mesh leave. It is at least 1/64: the error of a step is of
     /// third order, so there are then about four times as many steps.
-    pub fn shorter_steps(&self, problem: &DiscreteProblem, measured: &Measured) -> Option<f64> {
+    pub fn shorter_steps(&self, problem: &ObservedProblem, measured: &Measured) -> Option<f64> {
         let accuracy = problem.scene().accuracy?;
         let bars = measured.bars.iter().zip(&self.bars);
         let bars = bars.filter(|(bar, _)| problem.scene().requires_accuracy_of(&bar.name));
@@ -80,7 +78,7 @@ impl Outcome {
     /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end
     /// in a less damaged state: their relative errors count. Returns the scales of the bars in the last state. An extreme
     /// that grows is no scale.
-    fn set_scales(&mut self, problem: &DiscreteProblem, measured: &Measured) -> Vec<f64> {
+    fn set_scales(&mut self, problem: &ObservedProblem, measured: &Measured) -> Vec<f64> {
         let scales = |sizes: &[f64], forces: f64| {
             let scales = problem.figure_scales(sizes, &measured.unsettled, 0.0, forces);
             let of = |bar: &Bar| problem.figures.number(&bar.name).map_or(0.0, |i| scales[i]);
@@ -99,7 +97,7 @@ impl Outcome {
     }
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The error bars of all figures, from their errors and scales. An error may be small by chance, but hardly those of all
     /// components at a probe: it is at least [`OF_COMPONENTS`] of the largest of them.
     pub(crate) fn bars(&self, errors: &[f64], scales: &[f64]) -> Vec<Bar> {

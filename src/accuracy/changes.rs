@@ -50,7 +50,7 @@ pub(super) fn displacement(
     fine: &FewStepRun,
 ) -> f64 {
     let (before, after, size) = (coarse.strains(), fine.own_strains(), fine.energy());
-    let (problem, comm) = (fine.problem, fine.problem.body.nodes.partition.comm());
+    let (problem, comm) = (fine.problem, fine.problem.body.comm());
     let (body, elasticity) = (&problem.body, &problem.elasticity);
     let zeta = problem.zeta_at_points(&fine.outcome.last.state.zeta);
     let per_triangle = body.points_per_triangle();

@@ -4,7 +4,7 @@ use super::{Adapted, Extreme, LoopState, first_mesh::kinks};
 use crate::{
     evolution::{Outcome, Step, percent},
     mesh::Order,
-    problem::{Bar, DiscreteProblem},
+    observe::{Bar, ObservedProblem},
 };
 
 /// Why a pressure is not resolved below a gap with a table of the place.
@@ -15,7 +15,7 @@ impl LoopState {
     /// a required accuracy. A run that failed has no outcome.
     pub fn conclusion(
         &self,
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         outcome: Option<&Outcome>,
     ) -> Option<(bool, String)> {
         let (adapted, scene) = (self.adapted.as_ref()?, problem.scene());
@@ -50,7 +50,7 @@ impl LoopState {
         &self,
         adapted: &Adapted,
         accuracy: f64,
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         outcome: &Outcome,
     ) -> Vec<String> {
         let scene = problem.scene();
@@ -82,7 +82,7 @@ impl LoopState {
     }
 
     /// Notes on the accuracy and on the error bars of the run of `problem`.
-    pub fn notes(&self, problem: &DiscreteProblem, outcome: Option<&Outcome>) -> Vec<String> {
+    pub fn notes(&self, problem: &ObservedProblem, outcome: Option<&Outcome>) -> Vec<String> {
         let is_fixed = self.adapted.is_none();
         let notes = [
             self.conclusion(problem, outcome).map(|(_, note)| note),
@@ -103,7 +103,7 @@ impl LoopState {
 
     /// A note on curved edges of the adapted mesh that meet at an angle. The error bars do not contain the error of a smooth curve
     /// that they only follow roughly.
-    fn kinks(&self, problem: &DiscreteProblem) -> Option<String> {
+    fn kinks(&self, problem: &ObservedProblem) -> Option<String> {
         let (mesh, scene) = (&self.adapted.as_ref()?.mesh, problem.scene());
         let kinks = kinks(scene, mesh, scene.accuracy?).into_iter();
         let kinks = kinks.filter(|(allowed, kink)| !kink.is_corner && kink.angle > 2.0 * allowed);
@@ -120,7 +120,7 @@ impl LoopState {
 /// Notes on the `extremes` of the `last` state: a pressure that shows the kinks of a table, and a sound body with a singular
 /// stress. On finer meshes this stress grows and may exceed the threshold of the damage, which no error bar shows.
 pub fn notes_on_extremes(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     last: &Step,
     extremes: &[Extreme],
 ) -> Vec<String> {

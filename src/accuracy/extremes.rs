@@ -2,12 +2,11 @@
 
 use super::{Measured, conclusion::KINKS_OF_TABLE};
 use crate::{
+    advice::Singular,
     model::von_mises,
+    observe::{ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Value, rows_of},
     petsc::PetscError,
-    problem::{
-        ContactRow, Dimension, DiscreteProblem, Figure, NodalStress, Of, Singular, State, Value,
-        rows_of,
-    },
+    problem::State,
     scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
@@ -40,7 +39,7 @@ impl Extreme {
 
 /// The extremes of a state, with the stresses and pressures from which they come.
 pub struct Extremes<'a> {
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     /// The extremes of stresses and pressures, in the order of the figures.
     pub all: Vec<Extreme>,
     /// The stresses at the points of this rank, Pa, and the rows of Γ_C.
@@ -56,7 +55,7 @@ impl<'a> Extremes<'a> {
     /// # Errors
     /// PETSc failed.
     pub(super) fn new(
-        problem: &'a DiscreteProblem,
+        problem: &'a ObservedProblem,
         state: &State,
         values: &[Value],
     ) -> Result<Self, PetscError> {
@@ -94,7 +93,7 @@ impl<'a> Extremes<'a> {
         let points = nodal.points.iter().filter(|of| of.ends.iter().any(|end| next.contains(end)));
         let places = Vec::from_iter(points.map(|point| point.at));
         for of in &mut self.all {
-            let is_there = body.nodes.partition.comm().any(places.contains(&of.at));
+            let is_there = body.comm().any(places.contains(&of.at));
             if is_there && !self.problem.figures[of.number].is_pressure() {
                 of.unresolved = Some("a jump of a load".to_owned());
             }
@@ -107,7 +106,7 @@ impl<'a> Extremes<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn of(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         state: &State,
         values: &[Value],
         measured: &Measured,
@@ -213,6 +212,6 @@ impl<'a> Extremes<'a> {
             point.at == at && material.is_none_or(|(number, _)| *number == point.material)
         });
         let own = there.map(|(stress, _)| von_mises(*stress)).fold(f64::NEG_INFINITY, f64::max);
-        problem.body.nodes.partition.comm().max(own)
+        problem.body.comm().max(own)
     }
 }

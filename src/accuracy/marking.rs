@@ -6,10 +6,10 @@ use super::{
     sizes::{divided, influences, sharpened, size_ratios, touching},
 };
 use crate::{
+    advice::unresolved,
     evolution::AIM,
     mesh::{Mesh, MeshError, Order, Refinement, sorted},
     petsc::{PetscError, Session},
-    problem::unresolved,
     scene::Scene,
 };
 use std::{collections::HashSet, mem::take};
@@ -69,7 +69,7 @@ impl<'a> Estimate<'a> {
             (point.at, here.sum())
         });
         let singular = singular.collect();
-        let (displacement, end) = (run.displacement(), &run.outcome.last.state);
+        let (displacement, end) = (run.history.displacement, &run.outcome.last.state);
         let unresolved = unresolved(session, run.problem, end, accuracy, displacement)?;
         Ok(Self {
             unresolved,
@@ -102,7 +102,7 @@ impl<'a> Estimate<'a> {
     /// Does the mesh resolve the data of the scene? Another mesh may miss a whole peak of a foundation.
     pub(super) fn resolves_data(&self) -> bool {
         let is_allowed = |&depth: &f64| depth <= self.deepest;
-        self.unresolved.is_empty() && self.run.depths().iter().all(is_allowed)
+        self.unresolved.is_empty() && self.run.history.depths.iter().all(is_allowed)
     }
 
     /// The mesh with its errors.
@@ -121,10 +121,15 @@ impl<'a> Estimate<'a> {
             unknowns: 2 * self.run.problem.body.nodes.partition.total(),
             rounds,
             error: self.error,
-            damage_error: self.run.problem.damage().and(measured).map(|of| of.damage),
+            damage_error: self
+                .run
+                .problem
+                .damage()
+                .and(measured)
+                .map(|of| of.result.damage.unwrap_or(0.0)),
             damage: self.run.damage(),
             steps: MAX_SHARE_OF_STEPS * self.accuracy,
-            measured: measured.map_or_else(Measured::default, Measurement::result),
+            measured: measured.map_or_else(Measured::default, |of| of.result.clone()),
             worst: measured.and_then(worst),
             not_reached: end.filter(|end| **end != End::Reached).map(End::to_string),
         }
@@ -174,7 +179,7 @@ impl<'a> Estimate<'a> {
     /// smaller errors of u and the damage. The errors of the figures are to become `goal` times the usual aim.
     fn size_ratios(&self, measured: Option<&Measurement>, goal: f64) -> Vec<f64> {
         let order = if self.scene().order == Order::Quadratic { 2 } else { 1 };
-        let (mut shares, mut depths) = (self.shares.clone(), self.run.depths().to_vec());
+        let (mut shares, mut depths) = (self.shares.clone(), self.run.history.depths.clone());
         if let Some(measured) = measured {
             let larger = |(own, of_parts): (&mut f64, &f64)| *own = own.max(*of_parts);
             shares.iter_mut().zip(&measured.shares).for_each(larger);

@@ -7,15 +7,15 @@
 //! large, or if its time steps differ, this mesh is bisected itself.
 
 use super::{
-    AdaptError, Answer, End, Extreme, FEW, FewStepRun, Limits, Measured,
+    AccuracyLoop, AdaptError, Answer, End, Extreme, FEW, FewStepRun, Measured,
     changes::{damage, displacement},
+    problem_on,
     sequence::Sequence,
 };
 use crate::{
-    evolution::{AIM, Choices},
-    mesh::{Mesh, Order, Refinement},
-    petsc::Session,
-    problem::{Bar, Dimension, DiscreteProblem, Figure, Of},
+    evolution::AIM,
+    mesh::{Order, Refinement},
+    observe::{Dimension, Figure, ObservedProblem, Of},
     scene::Probe,
 };
 use std::slice::from_ref;
@@ -73,18 +73,12 @@ impl Cause {
 /// The errors of a run, from its changes when the mesh is bisected.
 #[derive(Default)]
 pub(super) struct Measurement {
-    /// The error bars of the figures; empty if the run ends at ζ_*.
-    pub(super) bars: Vec<Bar>,
-    /// The extremes that the meshes do not settle. They have no bars.
-    pub(super) unsettled: Vec<String>,
-    /// The error of ζ at the end over the damage, in L².
-    pub(super) damage: f64,
+    /// The errors of a run on the mesh. That of u is (‖u_h − u_{h/2}‖ / ‖u_{h/2}‖) / √(1 − r²), with r as in [`Sequence`].
+    pub(super) result: Measured,
     /// The relative error of u: the one measured at the end, or the estimate at the worst time if that is larger.
-    pub(super) displacement: f64,
-    /// The measured one, (‖u_h − u_{h/2}‖ / ‖u_{h/2}‖) / √(1 − r²), with r as in [`Sequence`]; 0 if a run stops.
-    at_end: f64,
+    displacement: f64,
     /// The error of the time of ζ_*, s, and this time; the error is infinite if only one of the two runs reaches it.
-    pub(super) stop: Option<[f64; 2]>,
+    stop: Option<[f64; 2]>,
     /// Per triangle of the mesh: its share of the squared relative error of u, from the estimates on its parts, and
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
@@ -98,60 +92,53 @@ pub(super) struct Measurement {
     finer: Option<(Refinement, Answer)>,
 }
 
-impl Measurement {
+impl AccuracyLoop<'_> {
     /// Measures the errors of the run `coarse`, with this `answer`, by the same run on finer meshes, and by the answers on the
-    /// meshes `before`. A mesh bisected twice is left out if it exceeds the `limits`, and if two meshes show already whether the
+    /// meshes before. A mesh bisected twice is left out if it exceeds the limits, and if two meshes show already whether the
     /// `accuracy` is reached. Collective.
     ///
     /// # Errors
     /// A triangle cannot be bisected, or the run on the finer mesh fails.
-    pub(super) fn new(
-        session: &Session,
+    pub(super) fn measurement(
+        &mut self,
         answer: &Answer,
         coarse: &FewStepRun,
-        choices: &Choices,
-        before: &[Answer],
         accuracy: Option<f64>,
-        limits: &mut Limits,
-    ) -> Result<Self, AdaptError> {
-        let scene = coarse.problem.scene();
-        let problem = |mesh: &Mesh| {
-            let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?;
-            problem.restrict(session).map_err(AdaptError::from)
-        };
+    ) -> Result<Measurement, AdaptError> {
+        let (scene, times) = (coarse.problem.scene(), &coarse.history.times);
         let finer = Refinement::start(answer.mesh.clone()).refine_everywhere()?;
-        let triangles = finer.mesh.triangles.len();
-        let of_fine = problem(&finer.mesh)?;
-        let run = || FewStepRun::run(session, &of_fine, choices, triangles, FEW, coarse.times());
-        let failed = |source| AdaptError::Run { triangles, source };
-        let fine = limits.measure(triangles, run).map_err(failed)?;
+        let of_fine = problem_on(self.session, scene, &finer.mesh)?;
+        let fine = self.solve(&of_fine, FEW, times)?;
         let mut answers = vec![Answer::new(&fine, finer.mesh.clone())];
-        let two = Sequence::new(before, answer, &answers, true);
-        let mut measured = Self::of_fields(&two, &finer, [answer, &answers[0]], coarse, &fine);
+        let two = Sequence::new(&self.before, answer, &answers, true);
+        let both = [answer, &answers[0]];
+        let mut measured = Measurement::of_fields(&two, &finer, both, coarse, &fine);
         measured.set_bars(&two, coarse, &fine);
-        let misses = |measured: &Self| {
+        let misses = |measured: &Measurement| {
             accuracy.is_some_and(|accuracy| measured.excess(accuracy, &scene.accuracy_of) > 1.0)
         };
         let is_done = two.has_coarser() || misses(&measured);
         if !is_done {
             measured.set_bars(&two.slower(), coarse, &fine);
         }
-        let triangles = 4 * triangles;
+        let triangles = 4 * finer.mesh.triangles.len();
         let is_decided = accuracy.is_some() && triangles > CHEAP && !misses(&measured);
-        if is_done || is_decided || limits.exceeded(&[triangles]).is_some() {
+        if is_done || is_decided || self.limits.exceeded(&[triangles]).is_some() {
             measured.finer = answers.pop().map(|fine| (finer, fine));
             return Ok(measured);
         }
         let finest = Refinement::start(finer.mesh.clone()).refine_everywhere()?.mesh;
-        let problem = problem(&finest)?;
-        let run = || FewStepRun::run(session, &problem, choices, triangles, FEW, coarse.times());
-        if let Ok(run) = limits.measure(triangles, run) {
+        let problem = problem_on(self.session, scene, &finest)?;
+        if let Ok(run) = self.solve(&problem, FEW, times) {
             answers.push(Answer::new(&run, finest));
-            measured.set_bars(&Sequence::new(before, answer, &answers, true), coarse, &fine);
+            let three = Sequence::new(&self.before, answer, &answers, true);
+            measured.set_bars(&three, coarse, &fine);
         }
         Ok(measured)
     }
+}
 
+impl Measurement {
     /// The errors of the run `coarse` with this `answer` on a refinement of the measured mesh, the last one `before`, from the
     /// same finer mesh. `None` if the time steps differ from those `before`, or if a run stops. Collective.
     pub(super) fn on_refined(
@@ -164,16 +151,18 @@ impl Measurement {
         let is_like = coarse.stop().is_none() && answer.times == before.last()?.times;
         let sequence = is_like.then(|| Sequence::new(before, answer, from_ref(fine), false))?;
         // From this mesh to the one before, the error falls as its estimate does.
-        let at_end = self.at_end * answer.error / before.last()?.error;
+        let at_end = self.result.displacement * answer.error / before.last()?.error;
         let displacement = coarse.relative().0.max(at_end);
-        let mut measured = Self { at_end, displacement, ..Self::default() };
+        let mut measured = Self { displacement, ..Self::default() };
+        measured.result.displacement = at_end;
         if coarse.problem.damage().is_some() {
             let [shares, largest] = damage(answer, finer, fine);
             // The finer mesh has an error, too: about r times that of the mesh before.
-            measured.damage = shares.iter().sum::<f64>().sqrt() + sequence.rate() * self.damage;
+            let before = sequence.rate() * self.result.damage.unwrap_or(0.0);
+            measured.result.damage = Some(shares.iter().sum::<f64>().sqrt() + before);
             measured.zeta = largest;
         }
-        measured.unsettled = self.unsettled.clone();
+        measured.result.unsettled = self.result.unsettled.clone();
         measured.set_bars_of_settled(&sequence, coarse);
         Some(measured)
     }
@@ -195,7 +184,7 @@ impl Measurement {
         measured.shares = vec![0.0; answer.mesh.triangles.len()];
         measured.depths = measured.shares.clone();
         for ((&parent, share), depth) in
-            finer.parent_of_triangle.iter().zip(of_parts).zip(fine.depths())
+            finer.parent_of_triangle.iter().zip(of_parts).zip(&fine.history.depths)
         {
             measured.shares[parent] += growth * share;
             measured.depths[parent] = measured.depths[parent].max(*depth);
@@ -204,13 +193,14 @@ impl Measurement {
             return measured;
         }
         let change = displacement(coarse, &answer.mesh, finer, fine);
-        measured.at_end = change / (1.0 - sequence.rate().powi(2)).sqrt();
-        measured.displacement = measured.displacement.max(measured.at_end);
+        let at_end = change / (1.0 - sequence.rate().powi(2)).sqrt();
+        measured.result.displacement = at_end;
+        measured.displacement = measured.displacement.max(at_end);
         if problem.damage().is_some() {
             let [shares, largest] = damage(answer, finer, finer_answer);
             let square = (1.0 - sequence.rate()).powi(-2);
             measured.of_damage = shares.iter().map(|share| square * share).collect();
-            measured.damage = measured.of_damage.iter().sum::<f64>().sqrt();
+            measured.result.damage = Some(measured.of_damage.iter().sum::<f64>().sqrt());
             measured.zeta = largest;
         }
         measured.of_points = fine.extremes.named(&problem.singular_points());
@@ -220,18 +210,19 @@ impl Measurement {
     /// Sets the bars of the figures, or of the time of ζ_*. Collective.
     fn set_bars(&mut self, sequence: &Sequence, coarse: &FewStepRun, fine: &FewStepRun) {
         self.stop = sequence.stop();
-        if self.stop.is_some() {
+        if let Some([error, _]) = self.stop {
+            self.result.stop = Some(error).filter(|error| error.is_finite());
             return;
         }
         let problem = fine.problem;
         // The extreme of the whole settles if that of its part does.
         let settles = |extreme: &&Extreme| {
-            let part = problem.part_of(extreme.number, fine.values());
+            let part = problem.part_of(extreme.number, &fine.outcome.last.figures);
             let part = self.of_points.iter().find(|of| of.number == part).unwrap_or(extreme);
             sequence.settles(part.number, part)
         };
         let unsettled = self.of_points.iter().filter(|of| !settles(of));
-        self.unsettled = unsettled.map(|of| of.name.clone()).collect();
+        self.result.unsettled = unsettled.map(|of| of.name.clone()).collect();
         self.set_bars_of_settled(sequence, coarse);
     }
 
@@ -243,29 +234,22 @@ impl Measurement {
             dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
-        self.bars = problem.bars(&errors, &coarse.scales(&self.unsettled));
-        self.bars.retain(|bar| !self.unsettled.contains(&bar.name));
-        problem.join_bars(&mut self.bars, coarse.values());
+        let Measured { bars, unsettled, .. } = &mut self.result;
+        *bars = problem.bars(&errors, &coarse.scales(unsettled));
+        bars.retain(|bar| !unsettled.contains(&bar.name));
+        problem.join_bars(bars, &coarse.outcome.last.figures);
     }
 
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.
     pub(super) fn leave_out(&mut self, names: &[String]) {
-        self.bars.retain(|bar| !names.contains(&bar.name));
-        self.unsettled.extend_from_slice(names);
+        self.result.bars.retain(|bar| !names.contains(&bar.name));
+        self.result.unsettled.extend_from_slice(names);
     }
 
     /// Why a figure in `names` has no accuracy, if the meshes do not settle one.
     pub(super) fn without_accuracy(&self, names: &[String]) -> Option<End> {
-        let name = names.iter().find(|name| self.unsettled.contains(name))?;
+        let name = names.iter().find(|name| self.result.unsettled.contains(name))?;
         Some(End::Unsettled(name.clone()))
-    }
-
-    /// The errors of a run on the mesh.
-    pub(super) fn result(&self) -> Measured {
-        let stop = self.stop.map(|[error, _]| error).filter(|error| error.is_finite());
-        let damage = (!self.zeta.is_empty()).then_some(self.damage);
-        let (bars, unsettled) = (self.bars.clone(), self.unsettled.clone());
-        Measured { bars, unsettled, stop, damage, displacement: self.at_end }
     }
 
     /// The largest measured error in `names`, or of all, over the error that the `accuracy` allows; infinite without errors.
@@ -277,11 +261,11 @@ impl Measurement {
     /// and the time of ζ_*. The largest error over its share comes first.
     pub(super) fn errors(&self, names: &[String]) -> Vec<MeasuredError> {
         let norms = [
-            ("damage", self.damage, 1.0),
+            ("damage", self.result.damage.unwrap_or(0.0), 1.0),
             ("displacement", self.displacement, SHARE),
             ("stopped_at", self.stop.map_or(0.0, |[error, time]| error / time), AIM),
         ];
-        let figures = self.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
+        let figures = self.result.bars.iter().map(|bar| (bar.name.as_str(), bar.relative(), SHARE));
         let is_named = |name: &str| names.is_empty() || names.iter().any(|other| other == name);
         let errors = figures.chain(norms).filter(|(name, ..)| is_named(name));
         let mut errors: Vec<_> = errors
@@ -295,8 +279,8 @@ impl Measurement {
     }
 
     /// The cause of the error of the figure or norm `name` of `problem`.
-    pub(super) fn cause(&self, name: &str, problem: &DiscreteProblem) -> Cause {
-        let Some(bar) = self.bars.iter().find(|bar| bar.name == name) else {
+    pub(super) fn cause(&self, name: &str, problem: &ObservedProblem) -> Cause {
+        let Some(bar) = self.result.bars.iter().find(|bar| bar.name == name) else {
             let of_damage = || Cause::Damage(self.of_damage.clone());
             return if name == "damage" { of_damage() } else { Cause::Fields(1.0) };
         };

@@ -38,8 +38,9 @@ use crate::{
     evolution::{Choices, RunError},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
+    observe::{Bar, ObservedProblem},
     petsc::{PetscError, Session},
-    problem::{Bar, Collapse, DiscreteProblem, LoadCurve, SetupError},
+    problem::{Collapse, LoadCurve, SetupError},
     scene::{Scene, Stepping, rounded},
 };
 pub use answer::INSTANTS;
@@ -201,13 +202,11 @@ pub fn measured_errors(
     let mesh = Refinement::start(mesh.clone()).mesh;
     let mut fixed = AccuracyLoop::new(session, choices, scene);
     loop {
-        let problem = fixed.problem(&mesh)?;
-        let run = fixed.solve(&problem, FEW)?;
+        let problem = problem_on(session, &fixed.scene, &mesh)?;
+        let run = fixed.solve(&problem, FEW, &[])?;
         if run.stop().is_none() || of_steps.is_some() || !fixed.make_steps_adaptive() {
             let answer = Answer::new(&run, mesh);
-            let measured =
-                Measurement::new(session, &answer, &run, choices, &[], None, &mut fixed.limits);
-            return Ok(measured?.result());
+            return Ok(fixed.measurement(&answer, &run, None)?.result);
         }
     }
 }
@@ -243,9 +242,9 @@ impl<'a> AccuracyLoop<'a> {
         let (mut refinement, mut progress) = (Refinement::start(mesh), Progress::new(accuracy));
         loop {
             self.rounds += 1;
-            let problem = self.problem(&refinement.mesh)?;
+            let problem = problem_on(self.session, &self.scene, &refinement.mesh)?;
             // SOLVE
-            let run = self.solve(&problem, INSTANTS)?;
+            let run = self.solve(&problem, INSTANTS, &[])?;
             if run.stop().is_some() && self.make_steps_adaptive() {
                 self.before.clear();
                 continue;
@@ -281,20 +280,17 @@ impl<'a> AccuracyLoop<'a> {
         }
     }
 
-    /// The problem on `mesh`, on this rank's part of it. Collective.
-    fn problem(&self, mesh: &Mesh) -> Result<DiscreteProblem, AdaptError> {
-        Ok(DiscreteProblem::new(self.scene.clone(), mesh.clone())?.restrict(self.session)?)
-    }
-
-    /// A run of `problem` with estimates at about `instants` times. Collective.
+    /// A run of `problem` with estimates at about `instants` times. Adaptive steps end at the times `followed` of the run with
+    /// which this one is compared. Collective.
     fn solve<'b>(
         &mut self,
-        problem: &'b DiscreteProblem,
+        problem: &'b ObservedProblem,
         instants: usize,
+        followed: &[f64],
     ) -> Result<FewStepRun<'b>, AdaptError> {
         let (session, choices) = (self.session, self.choices);
         let triangles = problem.mesh().triangles.len();
-        let run = || FewStepRun::run(session, problem, choices, triangles, instants, &[]);
+        let run = || FewStepRun::run(session, problem, choices, instants, followed);
         let run = self.limits.measure(triangles, run);
         run.map_err(|source| AdaptError::Run { triangles, source })
     }
@@ -313,19 +309,7 @@ impl<'a> AccuracyLoop<'a> {
         }
         let again = self.last.take().and_then(|last| last.on_refined(&self.before, answer, run));
         let again = again.filter(|of| of.excess(accuracy, &self.scene.accuracy_of) <= 1.0);
-        let (session, choices, before) = (self.session, self.choices, &self.before);
-        let new = || {
-            Measurement::new(
-                session,
-                answer,
-                run,
-                choices,
-                before,
-                Some(accuracy),
-                &mut self.limits,
-            )
-        };
-        match again.map_or_else(new, Ok) {
+        match again.map_or_else(|| self.measurement(answer, run, Some(accuracy)), Ok) {
             Ok(measured) => Ok(Ok(progress.measured(estimate, measured))),
             Err(error) if error.signal().is_some() => Err(error),
             Err(error) => Ok(Err(End::Failed(error.to_string()))),
@@ -367,7 +351,7 @@ impl<'a> AccuracyLoop<'a> {
         };
         let tolerance = if stops { FEW_STEP_TOLERANCE } else { adapted.steps };
         grid.stepping = Stepping::Auto { tolerance, expected: adapted.damage };
-        let mut problem = self.problem(mesh)?;
+        let mut problem = problem_on(self.session, &self.scene, mesh)?;
         let mut steps = tolerance;
         // If the mesh uses nearly the whole accuracy, the tolerance would become ever smaller.
         while steps >= tolerance / 64.0 {
@@ -388,6 +372,15 @@ impl<'a> AccuracyLoop<'a> {
     }
 }
 
+/// The problem of `scene` on `mesh`, on this rank's part of it. Collective.
+fn problem_on(
+    session: &Session,
+    scene: &Scene,
+    mesh: &Mesh,
+) -> Result<ObservedProblem, AdaptError> {
+    Ok(ObservedProblem::new(scene.clone(), mesh.clone())?.restrict(session)?)
+}
+
 /// The scene with some uniform steps.
 fn with_steps(scene: &Scene, steps: usize) -> Scene {
     let mut scene = scene.clone();
@@ -405,7 +398,7 @@ fn with_tolerance(mut scene: Scene, tolerance: f64) -> Scene {
 /// The scene, with adaptive steps if loads or gaps pass by within one of its steps. An error if the body turns over, or has no
 /// figure of the name for which an accuracy is required.
 fn with_passing_loads(session: &Session, scene: Scene, mesh: &Mesh) -> Result<Scene, AdaptError> {
-    let problem = DiscreteProblem::new(scene.clone(), mesh.clone())?.restrict(session)?;
+    let problem = problem_on(session, &scene, mesh)?;
     let figures = problem.figures.iter().filter(|of| of.dimension.has_bar());
     let names = Vec::from_iter(figures.map(|figure| &*figure.name));
     scene.check_figures(&names).map_err(SetupError::from)?;

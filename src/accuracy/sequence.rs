@@ -12,7 +12,7 @@
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
 use super::{Answer, Extreme, sizes::size_at};
-use crate::problem::SEEN;
+use crate::advice::SEEN;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The safety factor of a bar, and the larger one of the bar of a stress: on 40 bodies of a user 10 % of the bars of

@@ -2,10 +2,11 @@
 
 use super::{AdaptError, Adapted, Measured, adapted, measured_errors};
 use crate::{
+    advice::locks,
     evolution::{Choices, Outcome},
     mesh::Mesh,
+    observe::ObservedProblem,
     petsc::Session,
-    problem::{DiscreteProblem, locks},
     scene::{Scene, Stepping},
 };
 use serde::{Deserialize, Serialize};
@@ -86,7 +87,7 @@ impl LoopState {
     /// the start and those of the run.
     pub fn shorter_steps(
         &self,
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         outcome: &Outcome,
         [passed, seconds]: [f64; 2],
     ) -> Option<f64> {
@@ -106,7 +107,7 @@ impl LoopState {
     pub fn repeat(
         &mut self,
         session: &Session,
-        problem: &mut DiscreteProblem,
+        problem: &mut ObservedProblem,
         outcome: &Outcome,
         ratio: f64,
     ) -> Result<(), AdaptError> {

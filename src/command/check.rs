@@ -6,8 +6,9 @@ use signorini::{
     accuracy::INSTANTS,
     mesh::{Mesh, extent},
     model::{Material, Plane},
+    observe::ObservedProblem,
     output::terminal::{plain, say},
-    problem::{Collapse, DiscreteProblem},
+    problem::Collapse,
     scene::{Boundary, Condition, Scene, Stepping, Units, rounded},
 };
 use std::iter::once;
@@ -26,7 +27,7 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     say(&row("mesh", describe_mesh(&mesh, &scene.units)));
     say(&materials(&scene).join("\n"));
     say(&boundaries(&scene, &mesh));
-    let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
+    let problem = ObservedProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut lines = vec![row("unknowns", unknowns(&problem))];
     lines.extend(loads(&problem));
     lines.extend(support(&problem));
@@ -133,11 +134,11 @@ fn conditions(
 }
 
 /// The number of nodes with a gap condition. The bounds of a node are consecutive.
-pub(super) fn contact_nodes(problem: &DiscreteProblem) -> usize {
+pub(super) fn contact_nodes(problem: &ObservedProblem) -> usize {
     problem.constraints.bounds.chunk_by(|a, b| a.node == b.node).count()
 }
 
-fn unknowns(problem: &DiscreteProblem) -> String {
+fn unknowns(problem: &ObservedProblem) -> String {
     let nodes = problem.body.nodes.points.len();
     let damage = problem.damage().map_or(0, |_| problem.body.mesh.nodes.len());
     let contact = contact_nodes(problem);
@@ -145,7 +146,7 @@ fn unknowns(problem: &DiscreteProblem) -> String {
 }
 
 /// The resultants of the loads at the start and at the end.
-fn loads(problem: &DiscreteProblem) -> Vec<String> {
+fn loads(problem: &ObservedProblem) -> Vec<String> {
     let Units { length, force, .. } = &problem.scene().units;
     let line = |t: f64| {
         let load = problem.load(t);
@@ -162,7 +163,7 @@ fn loads(problem: &DiscreteProblem) -> Vec<String> {
 }
 
 /// The rigid motions of the body and its supports against them.
-fn support(problem: &DiscreteProblem) -> Vec<String> {
+fn support(problem: &ObservedProblem) -> Vec<String> {
     let motions = &problem.motions;
     if motions.all_prevented() {
         return vec![row(
@@ -186,7 +187,7 @@ fn support(problem: &DiscreteProblem) -> Vec<String> {
 /// N nodes take 0.7 μs N (N/4225)^0.27 per step, 50 μs N once, and 8 kB N of memory. If contact moves, a step
 /// takes three times as long, and another 0.65 ns m³ for m contact nodes. The figures are fits to runs with
 /// 300 to 66,000 nodes.
-fn cost(problem: &DiscreteProblem) -> String {
+fn cost(problem: &ObservedProblem) -> String {
     let scene = problem.scene();
     let (nodes, contact) = (problem.body.nodes.points.len() as f64, contact_nodes(problem) as f64);
     let step_on = |nodes: f64| 0.7e-6 * nodes * (nodes / 4225.0).powf(0.27);

@@ -104,7 +104,7 @@ impl Checkpoint {
     pub fn check(&self, task: &Task) -> Result<(), Failure> {
         let mut origins = self.origin.into_iter().zip(origin(task));
         let Some(difference) = origins.position(|(made, own)| made != own) else { return Ok(()) };
-        let rank = task.problem.body.nodes.partition.comm().rank();
+        let rank = task.problem.body.comm().rank();
         let path = path(&task.folder, self.run.last().record.step, rank);
         Err(refusal(&path, DIFFERENCES[difference]))
     }
@@ -119,7 +119,7 @@ fn refusal(path: &Path, reason: &str) -> Failure {
 
 /// Writes a checkpoint that replaces the previous one. Collective.
 pub fn write(task: &Task, recorded: Recorded, run: RunState) -> Result<(), OutputError> {
-    let (comm, folder) = (task.problem.body.nodes.partition.comm(), &task.folder);
+    let (comm, folder) = (task.problem.body.comm(), &task.folder);
     let step = run.last().record.step;
     let path = path(folder, step, comm.rank());
     let (accuracy, origin) = (task.accuracy.clone(), origin(task));

@@ -8,9 +8,10 @@ use signorini::{
     estimate::Simulation,
     evolution::{Choices, RunError, Step},
     fem::{DamageSystem, NodalBases, Stiffness, source, source_load},
+    observe::ObservedProblem,
     output::{check_is_own, create, terminal::say, write_whole},
     petsc::{Matrix, PetscError, Session},
-    problem::{DiscreteProblem, LoadCase, State},
+    problem::{LoadCase, State},
     scene::rounded,
 };
 use std::{
@@ -89,7 +90,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let (mut scene, _) = scene.read(&[])?;
     let mesh = read_mesh(&scene, true)?;
     let (_, mesh) = accuracy_loop(session, &mut scene, mesh, (false, None))?;
-    let problem = DiscreteProblem::new(scene, mesh).map_err(Failure::input)?;
+    let problem = ObservedProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut states = Vec::new();
     let mut keep = |step: &Step| {
         states.insert(0, step.state.clone());
@@ -131,7 +132,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
 /// (28), (M + kκL) ζ_n = M ζ_{n−1} + k b.
 fn files(
     session: &Session,
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     states: &[State],
 ) -> Result<Vec<File>, Failure> {
     let (body, constraints) = (&problem.body, &problem.constraints);

@@ -6,8 +6,8 @@ use signorini::{
     accuracy::Extreme,
     evolution::{GoverningValue, Outcome, Step},
     mesh::Mesh,
+    observe::{Dimension, Figure, Of},
     output::terminal::{plain, with_bar},
-    problem::{Dimension, Figure, Of},
 };
 
 /// A figure of the last state.

@@ -36,9 +36,9 @@ use signorini::{
     contact::{REGISTRY, SOLVERS, TAO_TYPES},
     interrupt::{Signal, received},
     mesh::{self, Format, Mesh},
+    observe::{Figure, Figures},
     output::terminal::say,
     printable::print_error,
-    problem::{Figure, Figures},
     scene::{MeshSource, SCHEMA, Scene, Units},
 };
 use std::{

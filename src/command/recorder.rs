@@ -46,8 +46,7 @@ impl<'a> Recorder<'a> {
     /// A recorder for a new run. Shows a description of the task.
     pub(super) fn new(task: &'a Task) -> Result<Self, OutputError> {
         let fields = FieldWriter::new(&task.folder, &task.problem)?;
-        let progress =
-            task.problem.body.nodes.partition.comm().is_root().then(|| screen::open(task));
+        let progress = task.problem.body.comm().is_root().then(|| screen::open(task));
         let saved = Instant::now();
         let of_record = json!(StepRecord::default());
         let figures = task.problem.figures.iter().enumerate();
@@ -117,7 +116,7 @@ impl<'a> Recorder<'a> {
 
     /// Writes and shows an accepted step. Collective.
     fn write(&mut self, step: &Step) -> Result<(), OutputError> {
-        let comm = self.task.problem.body.nodes.partition.comm();
+        let comm = self.task.problem.body.comm();
         if self.last.is_none() {
             let started = if comm.is_root() { self.start() } else { Ok(()) };
             // The other ranks write after the first one has removed the old results.
@@ -172,9 +171,9 @@ impl<'a> Recorder<'a> {
         let warnings = notes.len();
         notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
         if result.is_ok() {
-            checkpoint::remove(&task.folder, task.problem.body.nodes.partition.comm().rank(), None);
+            checkpoint::remove(&task.folder, task.problem.body.comm().rank(), None);
         }
-        let memory = task.problem.body.nodes.partition.comm().total(1e-6 * memory::peak());
+        let memory = task.problem.body.comm().total(1e-6 * memory::peak());
         // Only the first rank goes on from here.
         let Some(progress) = &self.progress else { return written };
 

@@ -20,9 +20,9 @@ use signorini::{
     interrupt::Interrupts,
     linear::LinearSolver,
     mesh::Mesh,
+    observe::ObservedProblem,
     output::{self, terminal::say},
     petsc::{Communicator, Session, stage},
-    problem::DiscreteProblem,
     scene::Scene,
 };
 use std::{
@@ -98,7 +98,7 @@ fn read_shared(comm: Communicator, scene: &Scene) -> Result<Mesh, Failure> {
 }
 
 /// Checks the PETSc options that would otherwise fail at the first factorisation. Collective.
-fn check_factors(session: &Session, problem: &DiscreteProblem) -> Result<(), Failure> {
+fn check_factors(session: &Session, problem: &ObservedProblem) -> Result<(), Failure> {
     let mut prefixes = ["elastic_"].into_iter().chain(problem.damage().map(|_| "damage_"));
     prefixes.try_for_each(|prefix| {
         let checked = LinearSolver::check_options(session, prefix);
@@ -179,7 +179,7 @@ fn read<'a>(
     let name = if scene.accuracy.is_some() { "adaptation" } else { "error bars" };
     let start = || accuracy_loop(session, &mut scene, mesh, (arguments.bars, saved));
     let (accuracy, mesh) = agree(comm, stage(name, start))?;
-    let problem = stage("discrete problem", || DiscreteProblem::new(scene, mesh));
+    let problem = stage("discrete problem", || ObservedProblem::new(scene, mesh));
     let problem = agree(comm, problem.map_err(Failure::input))?;
     let problem = stage("partition", || problem.restrict(session));
     let problem = agree(comm, problem.map_err(Failure::from))?;

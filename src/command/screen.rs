@@ -5,10 +5,11 @@ use signorini::{
     accuracy::Adapted,
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     mesh::extent,
+    observe::in_words,
     output::terminal::{Progress, plain, say, with_bar},
     petsc::Communicator,
     printable::print_error,
-    problem::{Collapse, in_words},
+    problem::Collapse,
     scene::{Scene, Scheme, Stepping, TimeGrid, rounded},
 };
 use std::{num::NonZero, thread, time::Instant};

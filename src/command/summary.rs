@@ -4,8 +4,8 @@ use super::{figures::LastFigure, provenance::provenance, task::Task};
 use serde_json::{Map, Value, json};
 use signorini::{
     evolution::{Outcome, RunError, StepRecord},
+    observe::ObservedProblem,
     petsc::stage_seconds,
-    problem::DiscreteProblem,
 };
 
 /// `summary.json` of a run that took `wall` seconds and `memory` MB.
@@ -63,7 +63,7 @@ pub(super) fn summary(
 
 /// Adds to the summary why the run stopped before its end, at which time, s, and the error of this time; null if it
 /// did not.
-fn add_stop(summary: &mut Value, problem: &DiscreteProblem, outcome: Option<&Outcome>) {
+fn add_stop(summary: &mut Value, problem: &ObservedProblem, outcome: Option<&Outcome>) {
     let stopped = outcome.and_then(|outcome| outcome.stopped);
     let collapse = problem.collapse.filter(|_| outcome.is_some() && stopped.is_none());
     let end = problem.scene().time.map_or(0.0, |grid| grid.end);

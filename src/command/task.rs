@@ -1,14 +1,14 @@
 //! The task of a run.
 
 use signorini::{
-    accuracy::LoopState, interrupt::Interrupts, problem::DiscreteProblem, scene::AsRun,
+    accuracy::LoopState, interrupt::Interrupts, observe::ObservedProblem, scene::AsRun,
 };
 use std::{fs::File, path::PathBuf, time::Instant};
 
 /// A run with checked input.
 pub struct Task<'a> {
     /// The problem on this rank's subdomain.
-    pub problem: DiscreteProblem,
+    pub problem: ObservedProblem,
     /// The numbers of triangles and of nodes with a gap condition of the whole body.
     pub triangles: usize,
     pub contact_nodes: usize,

@@ -90,19 +90,6 @@ pub enum ContactError {
         /// The residuals found.
         residuals: Kkt,
     },
-    /// Rounding keeps the answer from the tolerance.
-    #[error(
-        "{source}; double precision reaches only about {attainable:.0e} here {}",
-        advice(contrast)
-    )]
-    Limited {
-        /// The error of the solve.
-        source: Box<Self>,
-        /// The approximate tolerance that rounding allows.
-        attainable: f64,
-        /// The contrast of stiffness between two materials, if it is the cause.
-        contrast: Option<String>,
-    },
     /// The answer satisfies the KKT conditions of a stiffness that is not positive definite.
     #[error(
         "{method} gave an answer that stores negative energy: the stiffness is not positive definite"
@@ -114,21 +101,6 @@ pub enum ContactError {
     /// PETSc failed.
     #[error(transparent)]
     Petsc(#[from] PetscError),
-}
-
-/// The reason for large rounding, and advice.
-fn advice(contrast: &Option<String>) -> String {
-    match contrast {
-        Some(contrast) => format!(
-            "because {contrast}: check the units of both, or if they are meant, set contact.tolerance to \
-             that or more"
-        ),
-        None => {
-            "(triangles or parts much longer than wide, nearly incompressible or almost broken \
-                 material): set contact.tolerance to that or more, or mend the mesh"
-                .to_owned()
-        }
-    }
 }
 
 impl ContactError {
@@ -143,7 +115,7 @@ impl ContactError {
         Self::NotConverged { method, report, residuals, detail: detail.into() }
     }
 
-    /// Did the method miss a tolerance that rounding allows? Other settings may help.
+    /// Did the method miss the tolerance?
     pub fn is_missed(&self) -> bool {
         matches!(self, Self::NotConverged { .. } | Self::NotCertified { .. })
     }
@@ -153,7 +125,6 @@ impl ContactError {
     pub fn may_be_rescued(&self, comm: Communicator) -> bool {
         match self {
             Self::Failed { .. } => comm.is_serial(),
-            Self::Limited { source, .. } => source.may_be_rescued(comm),
             error => error.is_missed(),
         }
     }

@@ -13,7 +13,7 @@
 
 mod equilibrated;
 mod recovery;
-mod error_budget;
+mod damage_errors;
 mod simulation;
 
 pub use equilibrated::{EquilibratedStress, Unproved};
@@ -26,6 +26,8 @@ use crate::{
     petsc::{PetscError, stage},
     problem::{DiscreteProblem, State},
 };
+use damage_errors::{displacement_error_of, relative_to_damage};
+use nalgebra::DVector;
 
 /// If max |u| of the last step is below this fraction of its maximum in the run, the body counts as unloaded.
 pub(crate) const UNLOADED: f64 = 0.01;
@@ -34,7 +36,7 @@ pub(crate) const UNLOADED: f64 = 0.01;
 /// Collective.
 fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
     let Run { mut damage_step, mut contact_step, mut controller, mut outcome } = run;
-    let problem = damage_step.problem;
+    let problem = contact_step.problem;
     outcome.accuracy = stage("accuracy", || contact_step.accuracy(&outcome))?;
     outcome.accuracy.energy = stage("accuracy", || energy_error(problem, &outcome))?;
     let state = representative(&outcome).clone();
@@ -51,8 +53,28 @@ fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
     let is_known = problem.damage().is_some()
         && outcome.stopped.is_none()
         && controller.add_last_error(&mut damage_step).is_ok();
-    let steps = is_known.then(|| [controller.step_error(), controller.step_bar()]);
-    outcome.errors = ErrorBudget::new(problem, &outcome, steps, proof);
+    let last = &outcome.last.state;
+    let caused = |error: &DVector<f64>| displacement_error_of(problem, error.as_slice(), last);
+    let error = is_known.then(|| controller.step_error());
+    let bar = is_known.then(|| controller.step_bar());
+    let (displacement_bound, reservations) = match proof {
+        Some(Ok(proof)) => (Some(proof.relative), proof.left_out),
+        Some(Err(reason)) => (None, vec![reason]),
+        None => (None, Vec::new()),
+    };
+    outcome.errors = ErrorBudget {
+        displacement_mesh: outcome.accuracy.energy,
+        displacement_bound,
+        reservations,
+        displacement_steps: error.as_ref().map(caused),
+        damage_steps: error
+            .as_ref()
+            .and_then(|error| relative_to_damage(problem, error.as_slice(), last)),
+        solver: outcome.accuracy.displacement,
+        can_be_damaged: problem.damage().is_some(),
+        bars_of_steps: bar.map(|bar| (bar.clone(), caused(&bar))),
+        ..ErrorBudget::default()
+    };
     Ok(outcome)
 }
 

@@ -61,7 +61,7 @@ impl<'a> RecoveredStrains<'a> {
         };
         let squares: Vec<f64> = (0..body.own_triangles).map(square).collect();
         let mut sums = [squares.iter().sum(), elasticity.energy(body, zeta, u)];
-        body.nodes.partition.comm().sum(&mut sums);
+        body.comm().sum(&mut sums);
         EnergyError { squares, error: sums[0], energy: sums[1] }
     }
 

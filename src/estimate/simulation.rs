@@ -5,16 +5,16 @@ use crate::{
     contact::ContactSolver,
     evolution::{Choices, Observer, Outcome, RunError, RunState, Step, all_steps},
     model::DamageSource,
+    observe::ObservedProblem,
     petsc::Session,
-    problem::DiscreteProblem,
 };
 
 /// A run of Problem VP^hk, with contact solver and damage source of one's choice. The program itself starts its runs so.
 ///
 /// ```no_run
 /// # use signorini::{contact::ContactSolver, estimate::Simulation, model::DamageSource};
-/// # use signorini::{evolution::{RunError, Step}, petsc::Session, problem::DiscreteProblem};
-/// # fn run(problem: DiscreteProblem, own_solver: Box<dyn ContactSolver>, own_law: Box<dyn DamageSource>)
+/// # use signorini::{evolution::{RunError, Step}, petsc::Session, observe::ObservedProblem};
+/// # fn run(problem: ObservedProblem, own_solver: Box<dyn ContactSolver>, own_law: Box<dyn DamageSource>)
 /// # -> Result<(), RunError> {
 /// let session = Session::start(&[])?;
 /// let outcome = Simulation::new(&problem)
@@ -29,7 +29,7 @@ use crate::{
 /// # }
 /// ```
 pub struct Simulation<'a> {
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     choices: Choices,
     observer: Option<&'a mut dyn Observer>,
     saved: Option<RunState>,
@@ -38,7 +38,7 @@ pub struct Simulation<'a> {
 
 impl<'a> Simulation<'a> {
     /// A run with the contact solver of the scene, or the default one, and the paper's damage source.
-    pub fn new(problem: &'a DiscreteProblem) -> Self {
+    pub fn new(problem: &'a ObservedProblem) -> Self {
         let choices = Choices::of(problem.scene());
         Self { problem, choices, observer: None, saved: None, bounds_error: false }
     }

@@ -18,14 +18,10 @@ pub struct Choices {
 
 impl Choices {
     /// The solver that the scene names, or the default one, and the paper's damage source. A scene that names its damage
-    /// source would choose it here.
+    /// source would choose it here. A run reports an error if there is no solver of this name.
     pub fn of(scene: &Scene) -> Self {
-        Self::named(scene.contact.solver_name())
-    }
-
-    /// The solver called `name` and the paper's damage source. A run tells whether there is a solver of this name.
-    pub fn named(name: &str) -> Self {
-        Self { solver: ChosenSolver::Named(name.to_owned()), source: ChosenSource::Fremond }
+        let solver = ChosenSolver::Named(scene.contact.solver_name().to_owned());
+        Self { solver, source: ChosenSource::Fremond }
     }
 
     /// These choices with the contact solver called `name`.

@@ -38,15 +38,15 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, RunError, State, Step, StepFailure, StepRecord, agreed,
-    extrapolation::Extrapolation,
+    Choices, DiscreteProblem, LoadCase, ObservedProblem, RunError, State, Step, StepFailure,
+    StepRecord, agreed, extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
     linear::{FactorState, LinearSolver, Precision},
+    observe::SHOWN_AS_ZERO,
     petsc::{PetscError, Session, Vector, stage},
-    problem::SHOWN_AS_ZERO,
 };
 use certificate::Candidate;
 use decision::{Attempt, Decision};
@@ -59,7 +59,7 @@ use std::{ops::RangeInclusive, time::Instant};
 /// Solves the contact problems of a run, one after the other.
 pub struct ContactStep<'a> {
     session: &'a Session,
-    problem: &'a DiscreteProblem,
+    pub(crate) problem: &'a ObservedProblem,
     /// The chosen solver, then the one for steps in which it stops short of the tolerance, if there is one.
     solvers: Vec<SharedSolver>,
     /// Solves the linear systems of all solvers.
@@ -119,11 +119,11 @@ impl<'a> ContactStep<'a> {
     /// There is no solver of that name, or PETSc failed.
     pub fn new(
         session: &'a Session,
-        problem: &'a DiscreteProblem,
+        problem: &'a ObservedProblem,
         choices: &Choices,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
-        let (comm, unknowns) = (body.nodes.partition.comm(), 2 * body.nodes.partition.owned());
+        let (comm, unknowns) = (body.comm(), 2 * body.nodes.partition.owned());
         let stiffness = stage("stiffness pattern", || {
             Stiffness::new(session, body, &problem.elasticity, &constraints.bases)
         })?;
@@ -171,7 +171,7 @@ impl<'a> ContactStep<'a> {
         let started = Instant::now();
         let problem = self.problem;
         self.set_damage(zeta);
-        let comm = problem.body.nodes.partition.comm();
+        let comm = problem.body.comm();
         let case = agreed(comm, stage("loads", || problem.load_case(time)))?;
         let mut attempt = self.first_attempt(0, &case)?;
         let candidate = loop {
@@ -181,7 +181,7 @@ impl<'a> ContactStep<'a> {
                     let candidate = stage("certificate", || self.certify(reference, u, &case));
                     self.decide(attempt, stopped, candidate, &case)?
                 }
-                Err(error) => self.give_up(attempt, error, &case)?,
+                Err(error) => self.give_up(attempt, (error, None), &case)?,
             };
             match decision {
                 Decision::Accept(accepted, candidate) => {
@@ -202,7 +202,7 @@ impl<'a> ContactStep<'a> {
     fn set_damage(&mut self, zeta: &[f64]) {
         let problem = self.problem;
         let zeta_at_points = problem.zeta_at_points(zeta);
-        if problem.body.nodes.partition.comm().any(zeta_at_points != self.zeta_at_points) {
+        if problem.body.comm().any(zeta_at_points != self.zeta_at_points) {
             stage("stiffness", || {
                 self.stiffness.set_damage(&problem.body, &zeta_at_points);
             });
@@ -242,7 +242,7 @@ impl<'a> ContactStep<'a> {
         let u = next.reference.total(u);
         self.next = next;
         let mut state = State { time, u, zeta: zeta.to_vec(), contact, prescribed };
-        problem.share_reactions(&mut state, &unbalanced, rounding);
+        state.prescribed = problem.pressed(&state, &unbalanced, rounding);
         let (observation, figures) =
             stage("figures", || problem.observe(&state, &case.load, &unbalanced, rounding))?;
         let mut record = StepRecord::new(problem, step, &state, &observation, &report, &kkt);
@@ -282,7 +282,7 @@ impl<'a> ContactStep<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn accept(&mut self, time: f64) -> Result<(), PetscError> {
-        let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
+        let (problem, comm) = (self.problem, self.problem.body.comm());
         let mut c = self.c.read(<[f64]>::to_vec)?;
         self.next.reference.translate(&problem.constraints, &mut c, 1.0);
         stage("extrapolation", || self.extrapolation.accept(comm, time, c));
@@ -306,7 +306,7 @@ impl<'a> ContactStep<'a> {
     /// The first attempt by a solver: sets c, the reference and the warm start, all from the accepted steps. If the active
     /// bounds do not support the body, the load drives it as a rigid body until contact, and the reference follows.
     fn first_attempt(&mut self, solver: usize, case: &LoadCase) -> Result<Attempt, PetscError> {
-        let (problem, comm) = (self.problem, self.problem.body.nodes.partition.comm());
+        let (problem, comm) = (self.problem, self.problem.body.comm());
         let constraints = &problem.constraints;
         let mut next = self.accepted.clone();
         let unloaded =
@@ -348,7 +348,7 @@ impl<'a> ContactStep<'a> {
 
     /// Adds the motions that contact alone constrains, with these amplitudes, to a reference.
     fn move_rigidly(&self, reference: &mut Reference, amplitudes: &DVector<f64>) {
-        let DiscreteProblem { motions, body, constraints, .. } = self.problem;
+        let DiscreteProblem { motions, body, constraints, .. } = &**self.problem;
         reference.add(constraints, &motions.combined(body, amplitudes).field(body));
     }
 }

@@ -85,7 +85,7 @@ impl DamageStep<'_> {
             return Ok(SourceLoad { load: DVector::zeros(state.zeta.len()), min: 0.0 });
         };
         stage("damage source", || {
-            let comm = body.vertices.partition.comm();
+            let comm = body.comm();
             let phi = fem::source(body, (self.law, laws), &strains, &state.zeta);
             let failed = |source| RunError::Step {
                 step: step.record.step,
@@ -177,7 +177,7 @@ impl DamageStep<'_> {
 
     /// Is a source load zero on all ranks, as always without a damage law? Collective.
     fn is_zero(&self, load: &[f64]) -> bool {
-        self.problem.body.vertices.partition.comm().all(load.iter().all(|&b| b == 0.0))
+        self.problem.body.comm().all(load.iter().all(|&b| b == 0.0))
     }
 
     /// The state of the factor for a checkpoint, if there is one.

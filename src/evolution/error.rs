@@ -21,8 +21,8 @@ pub enum RunError {
         time: Option<f64>,
         /// The failure.
         source: Box<ContactError>,
-        /// Advice that follows the source; empty if the source contains it.
-        advice: &'static str,
+        /// Advice that follows the source; empty without one.
+        advice: String,
     },
     /// Another part of a step failed; the steps before it are accepted.
     #[error("step {step} (t = {}): {source}", rounded(*time))]
@@ -109,22 +109,32 @@ pub enum StepFailure {
 
 impl RunError {
     /// The contact solve of a step failed. The advice depends on the scene: another solver helps only with
-    /// contact, and shorter steps help only after the first solve.
+    /// contact, and shorter steps help only after the first solve. Neither helps if rounding keeps the answer from the tolerance;
+    /// it then allows about the tolerance `attainable`.
     pub(super) fn contact(
         problem: &DiscreteProblem,
         step: usize,
         time: f64,
-        source: ContactError,
+        (source, attainable): (ContactError, Option<f64>),
     ) -> Self {
-        let contact = problem.has_contact();
-        let advice = match (source.is_missed(), contact, step > 0) {
-            (false, ..) => "",
-            (_, true, true) => {
-                "; try another contact.solver, shorter steps or a larger contact.tolerance"
-            }
-            (_, true, false) => "; try another contact.solver or a larger contact.tolerance",
-            (_, false, true) => "; try shorter steps or a larger contact.tolerance",
-            (_, false, false) => "; try a larger contact.tolerance",
+        let others = match (problem.has_contact(), step > 0) {
+            (true, true) => "another contact.solver, shorter steps or ",
+            (true, false) => "another contact.solver or ",
+            (false, true) => "shorter steps or ",
+            (false, false) => "",
+        };
+        let reached = "; double precision reaches only about";
+        let advice = match (attainable, problem.contrast()) {
+            (Some(attainable), Some(contrast)) => format!(
+                "{reached} {attainable:.0e} here because {contrast}: check the units of both, or if they are meant, set \
+                 contact.tolerance to that or more"
+            ),
+            (Some(attainable), None) => format!(
+                "{reached} {attainable:.0e} here (triangles or parts much longer than wide, nearly incompressible or almost \
+                 broken material): set contact.tolerance to that or more, or mend the mesh"
+            ),
+            (None, _) if source.is_missed() => format!("; try {others}a larger contact.tolerance"),
+            (None, _) => String::new(),
         };
         let time = problem.scene().time.map(|_| time);
         Self::Contact { step, time, source: Box::new(source), advice }

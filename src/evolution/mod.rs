@@ -23,7 +23,7 @@
 //! `all_steps` is this loop, and `Run::step` one of its steps. [`ContactStep`] solves and certifies (26), `DamageStep` solves (28), and `StepController`
 //! plans each step and accepts or rejects it; steps are uniform or adaptive.
 //!
-//! What crosses the door: `command` starts a run of a [`DiscreteProblem`] with an [`Observer`], which sees every
+//! What crosses the door: `command` starts a run of an [`ObservedProblem`] with an [`Observer`], which sees every
 //! accepted [`Step`], by way of `estimate`, which enters its error estimates in the [`Outcome`].
 
 mod choices;
@@ -39,7 +39,10 @@ mod state;
 mod step_controller;
 
 pub use crate::contact::ContactPoint;
-pub use crate::problem::{ContactRow, DiscreteProblem, Loads, SetupError, State, Supports};
+pub use crate::{
+    observe::{ContactRow, ObservedProblem, Supports},
+    problem::{DiscreteProblem, Loads, SetupError, State},
+};
 pub use choices::Choices;
 pub use contact_step::{Accuracy, ContactStep};
 pub(crate) use damage_step::DamageStep;
@@ -71,7 +74,7 @@ use step_controller::{Decision, StepState};
 /// See [`RunError`]; every accepted step has been seen by then.
 pub(crate) fn all_steps<'a>(
     session: &'a Session,
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     choices: &'a Choices,
     observer: &mut dyn Observer,
     saved: Option<RunState>,
@@ -138,7 +141,7 @@ impl Run<'_> {
             Decision::Accept(mut step) => {
                 contact_step.accept(planned.time)?;
                 step.record.seconds = started.elapsed().as_secs_f64();
-                outcome.accept(*step, damage_step.problem);
+                outcome.accept(*step, contact_step.problem);
                 self.report(observer)?;
             }
             Decision::Retry => outcome.rejected += 1,
@@ -153,7 +156,7 @@ impl Run<'_> {
     /// Reports the last accepted step to the observer. Then the run goes on, keeps a checkpoint or ends, as the
     /// observers of all ranks decide. Collective.
     fn report(&mut self, observer: &mut dyn Observer) -> Result<(), RunError> {
-        let comm = self.damage_step.problem.body.nodes.partition.comm();
+        let comm = self.damage_step.problem.body.comm();
         let wanted = observer.accept(&self.outcome.last).map_err(RunError::Observer);
         let next = Next::of_urgency(comm.max(agreed(comm, wanted)?.urgency()));
         if next != Next::Step {

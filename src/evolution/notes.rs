@@ -130,7 +130,7 @@ fn slowest_diffusion(body: &Body, kappa: &[f64]) -> f64 {
         kappa.get(body.material(t)).map_or(f64::INFINITY, |kappa| kappa / (h * h))
     };
     let own = body.mesh.triangles.iter().enumerate().map(rate).fold(f64::INFINITY, f64::min);
-    body.nodes.partition.comm().min(own)
+    body.comm().min(own)
 }
 
 /// A note if u is too large for infinitesimal strains: |∇u| (Frobenius) above `LARGE` in a noticeable part of
@@ -139,7 +139,7 @@ fn large_gradients(body: &Body, u: &[f64]) -> Option<String> {
     let gradients = for_elements!(body, cells => cells.gradients(u));
     let own = gradients.iter().zip(&body.triangles).take(body.own_triangles);
     let large = own.filter(|(gradient, _)| gradient.norm() > LARGE).map(|(_, t)| t.area()).sum();
-    let part = body.nodes.partition.comm().total(large) / body.area;
+    let part = body.comm().total(large) / body.area;
     (part > NOTICEABLE).then(|| {
         format!(
             "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \

@@ -1,13 +1,13 @@
 //! The outcome of a run that did not fail.
 
 use super::{
-    Accuracy, DiscreteProblem, ErrorBudget, Step, StepRecord,
+    Accuracy, ErrorBudget, ObservedProblem, Step, StepRecord,
     damage_step::{MAX_BALANCE, PlannedStep},
 };
 use crate::{
     contact::Kkt,
     fem::{Mass, RigidMotion},
-    problem::Bar,
+    observe::Bar,
 };
 use serde::{Deserialize, Serialize};
 use std::{mem, rc::Rc};
@@ -79,7 +79,7 @@ impl Stop {
 
 impl Outcome {
     /// The outcome of a run after its first solve, (27).
-    pub(super) fn new(first: Step, problem: &DiscreteProblem) -> Self {
+    pub(super) fn new(first: Step, problem: &ObservedProblem) -> Self {
         let mut outcome = Self { last: first, ..Self::default() };
         outcome.last.govern(problem, &[]);
         outcome.count_last();
@@ -94,12 +94,12 @@ impl Outcome {
     }
 
     /// The sizes of all figures in the run, from which their scales come.
-    pub(crate) fn sizes(&self, problem: &DiscreteProblem) -> Vec<f64> {
+    pub(crate) fn sizes(&self, problem: &ObservedProblem) -> Vec<f64> {
         let governing = self.last.governing.iter();
         problem.figures.magnitudes(governing.map(|of| of.map_or(0.0, |of| of.value)))
     }
 
-    pub(super) fn accept(&mut self, mut step: Step, problem: &DiscreteProblem) {
+    pub(super) fn accept(&mut self, mut step: Step, problem: &ObservedProblem) {
         step.govern(problem, &self.last.governing);
         let before = Rc::new(mem::replace(&mut self.last, step));
         let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {

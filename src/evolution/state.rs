@@ -1,10 +1,10 @@
 //! A step: its fields and its figures.
 
-use super::{DiscreteProblem, State};
+use super::{ObservedProblem, State};
 use crate::{
     contact::{ContactReport, Kkt},
     fem::{DamageCertificate, RigidMotion},
-    problem::{Figure, Observation, Value},
+    observe::{Figure, Observation, Value},
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub struct Step {
     pub state: State,
     /// The first columns of a row of `history.csv`.
     pub record: StepRecord,
-    /// The values of all figures, in the order of [`DiscreteProblem::figures`].
+    /// The values of all figures, in the order of [`ObservedProblem::figures`].
     pub figures: Vec<Value>,
     /// The governing value of each figure in all steps so far; `None` for places.
     pub governing: Vec<Option<GoverningValue>>,
@@ -93,7 +93,7 @@ pub struct StepRecord {
 
 impl Step {
     /// Sets the governing values from those of the step before; empty for the first one.
-    pub(super) fn govern(&mut self, problem: &DiscreteProblem, before: &[Option<GoverningValue>]) {
+    pub(super) fn govern(&mut self, problem: &ObservedProblem, before: &[Option<GoverningValue>]) {
         let governing = |(i, (figure, of)): (usize, (&Figure, &Value))| {
             let (before, time) = (before.get(i).copied().flatten(), self.record.time);
             let own = GoverningValue { value: of.value, at: of.at, time };
@@ -115,7 +115,7 @@ impl Step {
 impl StepRecord {
     /// The record of the step n = `step`. Entries of the damage step are zero.
     pub(super) fn new(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         step: usize,
         state: &State,
         observation: &Observation,
@@ -133,7 +133,7 @@ impl StepRecord {
             displacement_max: observation.displacement_max.value,
             work: observation.work,
             contact_force: observation.contact_force,
-            active_nodes: problem.body.nodes.partition.comm().count(active.len()),
+            active_nodes: problem.body.comm().count(active.len()),
             iterations: report.iterations,
             linear_iterations: report.linear_iterations,
             factorisations: report.factorisations,

@@ -5,7 +5,10 @@ use super::{
     element::{POINTS, Quadratic, quadratic_values},
     for_elements,
 };
-use crate::mesh::{Mesh, Order, sorted};
+use crate::{
+    mesh::{Mesh, Order, sorted},
+    petsc::Communicator,
+};
 use nalgebra::Vector3;
 use rustc_hash::FxHashMap as HashMap;
 use std::{
@@ -130,6 +133,11 @@ impl Body {
             }
             Some(q) => Elements::Quadratic(Cells { nodes: &q.nodes, elements: &q.elements }),
         }
+    }
+
+    /// The ranks that share the body.
+    pub fn comm(&self) -> Communicator {
+        self.nodes.partition.comm()
     }
 
     /// The number of quadrature points of u in a triangle. It is known on a rank without triangles, too.

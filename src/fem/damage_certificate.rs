@@ -49,7 +49,7 @@ impl DamageCertificate {
             sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
             (least, largest) = (area.min(least), largest.max(after[i].abs()));
         }
-        let comm = body.vertices.partition.comm();
+        let comm = body.comm();
         comm.sum(&mut sums);
         let [squares, rhs, balance, weighted, above] = sums;
         let (balance, least) = (balance.abs() / body.area, comm.min(least));

@@ -73,7 +73,7 @@ impl Patches {
     pub(crate) fn new(body: &Body) -> Self {
         let samples: Vec<_> = for_elements!(body, cells => sample_points(body, &cells));
         let last = body.materials.iter().copied().max().unwrap_or(0);
-        let last = body.vertices.partition.comm().max(f64::from(last)) as usize;
+        let last = body.comm().max(f64::from(last)) as usize;
         let mut patches = Self {
             near_jumps: body.near_jumps.clone(),
             vertices: body.mesh.nodes.clone(),

@@ -90,7 +90,7 @@ pub fn resultant(body: &Body, force: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
         sums[1] += fy;
         sums[2] += (x - cx) * fy - (y - cy) * fx;
     }
-    body.nodes.partition.comm().sum(&mut sums);
+    body.comm().sum(&mut sums);
     sums
 }
 

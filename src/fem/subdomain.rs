@@ -101,21 +101,16 @@ impl LocalNodes {
 }
 
 impl Subdomain {
-    /// The ranks that own the vertices of `mesh`; `None` if there is only one. Collective.
+    /// The subdomain of this rank; `None` if there is only one rank. Collective.
     ///
     /// # Errors
-    /// PETSc cannot divide it.
-    pub fn owners(session: &Session, mesh: &Mesh) -> Result<Option<Vec<usize>>, PetscError> {
-        let divided = || divide(session, mesh.nodes.len(), &mesh.triangles);
-        (!session.comm().is_serial()).then(divided).transpose()
-    }
-
-    /// The subdomain of this rank, from the owners of all vertices. Collective.
-    ///
-    /// # Errors
-    /// PETSc failed.
-    pub fn new(session: &Session, body: &Body, owner: &[usize]) -> Result<Self, PetscError> {
+    /// PETSc cannot divide the mesh.
+    pub fn new(session: &Session, body: &Body) -> Result<Option<Self>, PetscError> {
         let (comm, mesh) = (session.comm(), &body.mesh);
+        if comm.is_serial() {
+            return Ok(None);
+        }
+        let owner = divide(session, mesh.nodes.len(), &mesh.triangles)?;
         // A triangle belongs to the owner of its first node.
         let around = |t: &usize| mesh.triangles[*t].iter().any(|&i| owner[i] == comm.rank());
         let own = |t: &usize| owner[mesh.triangles[*t][0]] == comm.rank();
@@ -124,7 +119,7 @@ impl Subdomain {
         triangles.extend((0..mesh.triangles.len()).filter(|t| around(t) && !own(t)));
 
         let kept = triangles.iter().flat_map(|&t| mesh.triangles[t]);
-        let vertices = LocalNodes::new(session, owner, kept)?;
+        let vertices = LocalNodes::new(session, &owner, kept)?;
         let quadratic = body.quadratic.as_ref().map(|quadratic| {
             // The middle of an edge belongs to the owner of its first end.
             let mut owner = owner.to_vec();
@@ -133,7 +128,7 @@ impl Subdomain {
             let kept = triangles.iter().flat_map(|&t| quadratic.nodes[t]);
             LocalNodes::new(session, &owner, kept)
         });
-        Ok(Self { vertices, quadratic: quadratic.transpose()?, triangles, own_triangles })
+        Ok(Some(Self { vertices, quadratic: quadratic.transpose()?, triangles, own_triangles }))
     }
 
     /// The nodes of u.

@@ -6,7 +6,7 @@ use super::{
     vtk::{DataArray, REAL, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
 };
-use crate::problem::ContactRow;
+use crate::observe::ContactRow;
 use std::path::{Path, PathBuf};
 
 /// VTK_LINE, with its number of nodes.

@@ -5,7 +5,7 @@
 //! - [`Table`] writes CSV files row by row;
 //! - other files appear whole ([`write_whole`]).
 //!
-//! What crosses the door: `command` hands over a `DiscreteProblem`, its states and the records of its steps. All names
+//! What crosses the door: `command` hands over an `ObservedProblem`, its states and the records of its steps. All names
 //! of files in a folder of results are here, and so is the rule which of them a new run removes.
 
 mod contact;

@@ -11,8 +11,9 @@ use super::{
 use crate::{
     fem::Elements,
     model::von_mises,
+    observe::{NodalStress, ObservedProblem, principal, principal_direction},
     petsc::PetscError,
-    problem::{DiscreteProblem, NodalStress, State, principal, principal_direction},
+    problem::State,
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -67,8 +68,8 @@ impl FieldWriter {
     ///
     /// # Errors
     /// The names of the columns of `contact.csv` cannot be written.
-    pub fn new(folder: &Path, problem: &DiscreteProblem) -> Result<Self, OutputError> {
-        let comm = problem.body.nodes.partition.comm();
+    pub fn new(folder: &Path, problem: &ObservedProblem) -> Result<Self, OutputError> {
+        let comm = problem.body.comm();
         let triangles = comm.gather(&[problem.body.own_triangles as f64]);
         let stress = Arc::clone(problem.nodal_stress());
         let kind = match problem.body.elements() {
@@ -113,7 +114,7 @@ impl FieldWriter {
     ///
     /// # Errors
     /// A file of this frame or of the previous one cannot be written.
-    pub fn add(&mut self, problem: &DiscreteProblem, state: &State) -> Result<(), OutputError> {
+    pub fn add(&mut self, problem: &ObservedProblem, state: &State) -> Result<(), OutputError> {
         self.complete()?;
         let number = format!("{:0width$}", self.frames, width = self.digits);
         let (stem, contact_file) = (format!("fields_{number}"), format!("contact_{number}.vtu"));
@@ -121,11 +122,11 @@ impl FieldWriter {
         // This is collective: all ranks collect Γ_C, even if one has failed to collect its fields.
         let (contact, pressures) = problem.supports.contact.rows(&problem.body, state);
         if problem.scene().output.every == Some(0) {
-            let is_root = problem.body.nodes.partition.comm().is_root();
+            let is_root = problem.body.comm().is_root();
             let rows = if is_root { &contact[..] } else { &[] };
             return self.contact.add(&contact_file, state.time, rows);
         }
-        let (cells, comm) = (cell_data(problem, state), problem.body.nodes.partition.comm());
+        let (cells, comm) = (cell_data(problem, state), problem.body.comm());
         let failed = |error| OutputError::new(Path::new("a frame"), error);
         let mut points = point_data(problem, &self.stress, state, &pressures).map_err(failed)?;
         let strained = NodalStress::strained(problem, state);
@@ -196,7 +197,7 @@ fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
 /// and the remaining gap NaN. At a corner with two gap conditions they are the larger pressure and the smaller gap.
 /// Collective.
 fn point_data(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     points: &NodalStress,
     state: &State,
     pressures: &[(usize, f64)],
@@ -249,7 +250,7 @@ fn stress_data(stresses: &[[f64; 4]]) -> [DataArray; 4] {
 
 /// The mean stress of each triangle, xx, yy, xy, as the finite elements have it. If there are several materials,
 /// each triangle has a number: 0, or 1, 2, … for the surfaces of the scene by name.
-fn cell_data(problem: &DiscreteProblem, state: &State) -> Vec<DataArray> {
+fn cell_data(problem: &ObservedProblem, state: &State) -> Vec<DataArray> {
     let (elasticity, body) = (&problem.elasticity, &problem.body);
     let zeta = problem.zeta_at_points(&state.zeta);
     let stress = elasticity.stresses(body, &zeta, &state.u);

@@ -1,6 +1,5 @@
 //! The conditions of a scene on the named parts of the boundary, node by node and edge by edge.
 
-use super::loads::SurfaceForce;
 use crate::{
     ROUNDING,
     contact::{NodalConstraint, RigidMotions, RowLaw},
@@ -16,14 +15,12 @@ pub(super) struct BoundaryConditions {
     pub(super) rows: Vec<NodalConstraint>,
     /// Per row: its value.
     pub(super) values: Vec<RowValue>,
-    /// The names of the boundaries that support the body, and per row of a prescribed displacement the number of its
+    /// The number of boundaries that support the body, and per row of a prescribed displacement the number of its
     /// boundary among them.
-    pub(super) supports: Vec<String>,
+    supports: usize,
     pub(super) prescribed_by: Vec<usize>,
     /// The elasticity of the materials.
     pub(super) elasticity: Elasticity,
-    /// The surface loads of Γ_N.
-    pub(super) surface_forces: Vec<SurfaceForce>,
     /// Per node: the largest possible angle between the mesh normal and the exact normal, rad.
     normal_errors: Vec<f64>,
 }
@@ -95,11 +92,7 @@ impl BoundaryConditions {
                     }
                 }
             }
-            let forces = boundary.loads().map(|force| SurfaceForce::new(points, &edges, force));
-            conditions.surface_forces.extend(forces);
-            if boundary.is_support() {
-                conditions.supports.push(boundary.name.clone());
-            }
+            conditions.supports += usize::from(boundary.is_support());
         }
         for (node, faces) in joined_faces(gaps) {
             for (BoundaryFace { normal: direction, length, .. }, distances) in faces {
@@ -111,10 +104,10 @@ impl BoundaryConditions {
         conditions
     }
 
-    /// Adds a condition at a point; if it prescribes a displacement, for the support whose name follows.
+    /// Adds a condition at a point; if it prescribes a displacement, for the support that is counted next.
     fn add(&mut self, row: NodalConstraint, point: [f64; 2], of: Vec<Expression>) {
         if !row.is_gap() {
-            self.prescribed_by.push(self.supports.len());
+            self.prescribed_by.push(self.supports);
         }
         self.rows.push(row);
         self.values.push(RowValue { point, of });

@@ -6,8 +6,9 @@ mod jumps;
 mod parts;
 
 pub(crate) use curve::LoadCurve;
-pub(super) use jumps::{jump, load_jumps, near_jumps};
-pub(super) use parts::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point};
+pub(super) use jumps::near_jumps;
+pub(crate) use jumps::{jump, load_jumps};
+pub(crate) use parts::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point};
 
 use super::boundary_conditions::{BoundaryConditions, RowValue};
 use crate::{
@@ -16,8 +17,7 @@ use crate::{
     mesh::sorted,
     scene::{Expression, Scene},
 };
-use forces::BodyForce;
-pub(super) use forces::SurfaceForce;
+use forces::{BodyForce, SurfaceForce};
 use rustc_hash::FxHashMap as HashMap;
 use std::mem::take;
 
@@ -49,7 +49,7 @@ pub(crate) struct ElementLoads {
 }
 
 impl Loads {
-    /// Takes the loads on `body` and the values of its rows from the `conditions`.
+    /// The loads of `scene` on `body`, and the values of its rows from the `conditions`.
     pub(super) fn new(body: &Body, scene: &Scene, conditions: &mut BoundaryConditions) -> Self {
         let values = take(&mut conditions.values);
         let first = |(row, value): (&NodalConstraint, &RowValue)| match row.is_gap() {
@@ -58,7 +58,12 @@ impl Loads {
         };
         let first_gaps = conditions.rows.iter().zip(&values).map(first).collect();
         let body_force = BodyForce::new(body, scene);
-        let surface_forces = take(&mut conditions.surface_forces);
+        let surface_forces = scene.boundaries.iter().flat_map(|boundary| {
+            let edges = body.edges(body.mesh.edges_of(&boundary.name));
+            let points = &body.nodes.points;
+            boundary.loads().map(move |force| SurfaceForce::new(points, &edges, force))
+        });
+        let surface_forces = surface_forces.collect();
         let constant = None;
         let mut loads = Self { body_force, surface_forces, values, first_gaps, constant };
         if !loads.forces().any(Expression::depends_on_time) {

@@ -5,66 +5,39 @@
 //! - [`DiscreteProblem`]: the body, its materials, its supports and the tolerance;
 //! - [`Loads`]: nodal loads, prescribed displacements and gaps as functions of time, integrated so finely that no
 //!   narrow load is overlooked (`LoadCase`: their values at one time);
-//! - [`Supports`] and probes: the printed resultants and values at points; [`Bar`]: the error bar of such a figure;
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
-//! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]; `estimate` checks
-//! how well mesh and steps resolve the functions; `output` writes states. Bad input is a [`SetupError`].
+//! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]. The rooms
+//! [`observe`](crate::observe) and [`advice`](crate::advice) read the problem and its states; this room uses neither.
+//! Bad input is a [`SetupError`].
 
 mod boundary_conditions;
 mod collapse;
-mod contact_figures;
-mod contact_line;
 mod error;
-mod figures;
 mod loads;
-mod mean_displacement;
-mod nodal_stress;
-mod notes;
-mod penetration;
-mod probe;
-mod singular;
 mod state;
-mod supports;
-mod unresolved;
 
 pub use collapse::Collapse;
-pub(crate) use contact_figures::{ContactFigures, rows_of};
-pub use contact_line::{ContactLine, ContactRow};
 pub use error::SetupError;
-pub use figures::{Bar, Dimension, Figure, Figures, Of, Value, in_words};
-pub(crate) use figures::{NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
-use figures::{PartOfBoundary, Parts};
 pub use loads::Loads;
-pub(crate) use loads::SAMPLE_TIMES;
-pub(crate) use loads::{ElementLoads, LoadCurve};
-use loads::{NOTED, near_jumps};
-pub(crate) use mean_displacement::MeanDisplacement;
-use mean_displacement::Means;
-pub use nodal_stress::{NodalStress, Strained, principal, principal_direction};
-pub use notes::locks;
-pub(crate) use singular::SEEN;
-pub use singular::Singular;
+use loads::near_jumps;
+pub(crate) use loads::{
+    DEVIATION, ElementLoads, LoadCurve, NOTED, SAMPLE_TIMES, centroid, edge_parts, jump,
+    load_jumps, triangle_parts, triangle_point,
+};
 pub use state::State;
-pub use supports::Supports;
-pub(crate) use unresolved::unresolved;
 
 use crate::{
     ROUNDING,
-    contact::{Bound, Certificate, Constraints, RigidMotions},
+    contact::{Bound, Certificate, Constraints, NodalConstraint, RigidMotions},
     fem::{Body, Elasticity, Mass, Subdomain},
     mesh::{Lines, Mesh},
     model::DamageLaw,
-    petsc::{PetscError, Session},
     scene::{Boundary, Scene, SceneError, Stepping, TimeGrid, rounded},
 };
 use boundary_conditions::BoundaryConditions;
 use nalgebra::DVector;
-use probe::Probes;
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, OnceLock},
-};
+use std::collections::BTreeMap;
 
 /// A scene on its mesh, ready for the time steps.
 #[derive(Debug)]
@@ -83,13 +56,8 @@ pub struct DiscreteProblem {
     pub motions: RigidMotions,
     /// Loads and prescribed displacements.
     pub loads: Loads,
-    /// The boundaries that support the body.
-    pub supports: Supports,
-    probes: Probes,
-    means: Means,
-    /// Everything that a run prints.
-    pub figures: Figures,
-    nodal_stress: OnceLock<Arc<NodalStress>>,
+    /// The prescribed displacements of the undivided body, each with the number of its boundary among those that support it.
+    pub(crate) prescribed: Vec<(usize, NodalConstraint)>,
     /// max ‖·‖₂ of the nodal loads over sampled times of the run, N per metre of thickness.
     pub(crate) largest_load: f64,
     /// Are some straight sides chords of a curved boundary?
@@ -103,8 +71,8 @@ pub struct DiscreteProblem {
     scene: Scene,
     /// The collapse at which the run ends early, if the loads drive an unsupported motion.
     pub collapse: Option<Collapse>,
-    /// If `body` is a subdomain: the undivided mesh and the ranks that own its vertices.
-    undivided: Option<(Mesh, Vec<usize>)>,
+    /// If `body` is a subdomain: the undivided mesh.
+    undivided: Option<Mesh>,
 }
 
 /// The data of the contact problem (26) at one time.
@@ -150,12 +118,12 @@ impl DiscreteProblem {
             })?;
         motions.pin_free(&body, &mut constraints);
         let certificate = Certificate::new(&conditions.rows);
-        let supports = Supports::new(&scene, &body, &conditions, &lines);
+        let prescribed = conditions.prescribed_by.iter().copied().zip(conditions.rows);
         let norms = (scene.sample_times(SAMPLE_TIMES).into_iter())
             .map(|time| body.nodes.partition.norm(&loads.at(&body, time), 2));
         let foundations = scene.boundaries.iter().filter(|boundary| boundary.gap().is_some());
         let has_chords = lines.have_chords();
-        let mut problem = Self {
+        let problem = Self {
             has_chords,
             largest_load: norms.filter(|norm| norm.is_finite()).fold(0.0, f64::max),
             certificate,
@@ -164,11 +132,7 @@ impl DiscreteProblem {
             constraints,
             motions,
             loads,
-            supports,
-            probes: Probes::new(&scene, &body)?,
-            means: Means::new(&scene, &body, &lines),
-            figures: Figures::default(),
-            nodal_stress: OnceLock::new(),
+            prescribed: prescribed.collect(),
             tolerance: scene.contact.tolerance,
             materials: scene.materials_in(&body.materials),
             foundations: foundations.map(|boundary| boundary.name.clone()).collect(),
@@ -177,29 +141,19 @@ impl DiscreteProblem {
             undivided: None,
             collapse: None,
         };
-        problem.figures = Figures::new(&problem.parts());
         problem.until_collapse()
     }
 
-    /// Restricts a problem that every rank has made to this rank's subdomain. Collective.
-    ///
-    /// # Errors
-    /// PETSc cannot divide the mesh.
-    pub fn restrict(self, session: &Session) -> Result<Self, PetscError> {
-        let Some(owners) = Subdomain::owners(session, &self.body.mesh)? else { return Ok(self) };
-        let subdomain = Subdomain::new(session, &self.body, &owners)?;
-        Ok(Self {
+    /// Restricts a problem that every rank has made to this rank's subdomain.
+    pub(crate) fn restrict(self, subdomain: Subdomain) -> Self {
+        Self {
             constraints: self.constraints.restrict(&subdomain),
             certificate: self.certificate.restrict(&subdomain),
             loads: self.loads.restrict(&subdomain),
-            supports: self.supports.restrict(&subdomain),
-            probes: self.probes.restrict(&self.body, &subdomain),
-            means: self.means.restrict(&subdomain),
-            nodal_stress: OnceLock::new(),
             body: subdomain.body(&self.body),
-            undivided: Some((self.body.mesh, owners)),
+            undivided: Some(self.body.mesh),
             ..self
-        })
+        }
     }
 
     /// The names of the materials of the body.
@@ -234,7 +188,7 @@ impl DiscreteProblem {
     /// The nodal loads at `time`, if they are finite and drive no unconstrained rigid motion. Collective.
     pub(super) fn checked_load(&self, time: f64) -> Result<Vec<f64>, SetupError> {
         let load = self.load(time);
-        if !self.body.nodes.partition.comm().all(load.iter().all(|f| f.is_finite())) {
+        if !self.body.comm().all(load.iter().all(|f| f.is_finite())) {
             return Err(self.not_finite(time));
         }
         let driven = |source| SetupError::Driven { scene: self.scene.path.clone(), time, source };
@@ -304,23 +258,6 @@ impl DiscreteProblem {
         self.scene.damage.as_ref().map_or(0.0, |damage| damage.law.threshold)
     }
 
-    /// The parts of the scene of which there are figures.
-    fn parts(&self) -> Parts<'_> {
-        let several = if self.materials.len() > 1 { &self.materials[..] } else { &[] };
-        let number = |names: &[String], of: &str| names.iter().position(|name| name == of);
-        let boundaries = self.scene.boundaries.iter().map(|of| PartOfBoundary {
-            name: &of.name,
-            support: number(&self.supports.names, &of.name),
-            foundation: number(&self.foundations, &of.name),
-            moves: of.gap().is_some_and(|gap| gap.distance.depends_on_time()),
-        });
-        Parts {
-            materials: several.iter().map(|(_, name)| &**name).collect(),
-            boundaries: boundaries.collect(),
-            probes: self.scene.probes.iter().map(|probe| &*probe.name).collect(),
-        }
-    }
-
     /// η_*(ζ).
     pub(crate) fn truncated(&self, zeta: f64) -> f64 {
         self.scene.damage.as_ref().map_or(zeta, |damage| damage.law.truncate(zeta))
@@ -333,7 +270,7 @@ impl DiscreteProblem {
 
     /// The undivided mesh.
     pub fn mesh(&self) -> &Mesh {
-        self.undivided.as_ref().map_or(&self.body.mesh, |(mesh, _)| mesh)
+        self.undivided.as_ref().unwrap_or(&self.body.mesh)
     }
 
     /// The named curves of the whole mesh: the ends of their edges, m, the body on the left.

@@ -1,7 +1,9 @@
 //! The fields of the problem at one time.
 
-use crate::contact::ContactPoint;
+use super::DiscreteProblem;
+use crate::{ROUNDING, contact::ContactPoint, fem::RigidMotion};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// The fields at one time.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -22,5 +24,17 @@ impl State {
     /// The nodes of Γ_C, those with a prescribed normal displacement last.
     pub(crate) fn of_contact(&self) -> impl Iterator<Item = &ContactPoint> {
         self.contact.iter().chain(&self.prescribed)
+    }
+}
+
+impl DiscreteProblem {
+    /// `state`, without displacements if the body only moves rigidly: its strains are rounding. Collective.
+    pub(crate) fn strained<'a>(&self, state: &'a State) -> Cow<'a, State> {
+        let motion = RigidMotion::nearest(&self.body, &state.u);
+        let [rigid, rest] = motion.max_norms(&self.body, &state.u);
+        match rest > ROUNDING * rigid {
+            true => Cow::Borrowed(state),
+            false => Cow::Owned(State { u: vec![0.0; state.u.len()], ..state.clone() }),
+        }
     }
 }

@@ -11,7 +11,6 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::SceneError;
-use super::schema::is_key;
 use crate::suggestion::suggestion;
 
 /// The full path of a file.
@@ -62,8 +61,8 @@ pub(super) struct SceneText {
 impl SceneText {
     /// The content of the `file` at `path` and the `--set` arguments. A value of an argument that is not TOML
     /// becomes a string, so that shells need no second pair of quotes. The name of a constant of the file stands for the
-    /// constant if it is no key.
-    pub(super) fn new(path: &Path, file: &str, sets: &[String]) -> Self {
+    /// constant if it is no key at the top of a scene.
+    pub(super) fn new(path: &Path, file: &str, sets: &[String], is_key: fn(&str) -> bool) -> Self {
         let stride = sets.iter().map(String::len).fold(file.len(), usize::max) + 2;
         let root = DeTable::parse_recoverable(file).0.into_inner();
         let constants = root.get("constants").map(Spanned::get_ref);

@@ -230,7 +230,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::read`].
     pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let mut text = SceneText::new(path, text, overrides);
+        let mut text = SceneText::new(path, text, overrides, schema::is_key);
         let root = text.parse()?;
         let document = SceneText::values(&root);
         let mut found = Diagnostics::check(&text, &root, &document);

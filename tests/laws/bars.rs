@@ -3,10 +3,10 @@
 use crate::support::{adapted, scene, solved, square};
 use signorini::{
     accuracy::{self, Adapted},
-    evolution::{Choices, DiscreteProblem, Outcome},
+    evolution::{Choices, ObservedProblem, Outcome},
     mesh::Mesh,
+    observe::Bar,
     petsc::Session,
-    problem::Bar,
     scene::Scene,
 };
 
@@ -35,8 +35,8 @@ fn bar(bars: &[Bar], name: &str) -> f64 {
 }
 
 /// A scene on n × n cells of the square, solved with error bars.
-fn with_bars(scene: &Scene, n: usize) -> (DiscreteProblem, Outcome) {
-    let problem = DiscreteProblem::new(scene.clone(), square(n)).unwrap();
+fn with_bars(scene: &Scene, n: usize) -> (ObservedProblem, Outcome) {
+    let problem = ObservedProblem::new(scene.clone(), square(n)).unwrap();
     let mut outcome = solved(scene.clone(), square(n));
     let session = Session::start(&[]).unwrap();
     let measured =
@@ -124,7 +124,7 @@ fn contact_between_the_nodes_is_found_and_noted() {
     let roller = || block(2, "", "0.00001 + 0.5*(x - 0.57)^2", "-0.05");
     let given = solved(roller(), square(10));
     assert_eq!(given.last.record.active_nodes, 0);
-    let problem = DiscreteProblem::new(roller(), square(10)).unwrap();
+    let problem = ObservedProblem::new(roller(), square(10)).unwrap();
     let notes = given.notes(&problem).join("\n");
     assert!(notes.contains("between its nodes boundary \"bottom\""), "{notes}");
     let exact = figures(&solved(roller(), adapted(&roller(), square(10), 0.01).mesh));

@@ -5,7 +5,7 @@ use crate::support::{close, close_relative, difference, problem, run, square, tr
 use nalgebra::Matrix2;
 use signorini::{
     contact::{Answer, Certificate, ContactPoint, Kkt, NodalConstraint, RowLaw, SOLVERS, Scales},
-    evolution::DiscreteProblem,
+    evolution::ObservedProblem,
     petsc::Communicator,
 };
 
@@ -121,7 +121,7 @@ fn what_is_not_a_number_is_never_within_a_tolerance() {
 }
 
 /// A turned square on a foundation, pressed on its right half and pulled on its left.
-fn turned() -> DiscreteProblem {
+fn turned() -> ObservedProblem {
     let text = "
         material = { young = 100, poisson = 0.3, plane = 'stress' }
         boundary = [
@@ -133,7 +133,7 @@ fn turned() -> DiscreteProblem {
 }
 
 /// What is done to a discrete problem, in words and in deed.
-type Fault<'a> = (&'static str, &'a dyn Fn(&mut DiscreteProblem));
+type Fault<'a> = (&'static str, &'a dyn Fn(&mut ObservedProblem));
 
 #[test]
 fn a_fault_in_bases_or_bounds_cannot_certify_itself() {

@@ -3,7 +3,7 @@
 use crate::support::{distorted, history, largest, moved, problem, shipped, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, Outcome, Step},
+    evolution::{ObservedProblem, Outcome, Step},
     scene::Stepping,
 };
 
@@ -105,7 +105,7 @@ fn a_load_that_closes_the_gap_between_two_steps_is_noticed() {
 }
 
 /// A square that is bent down on a foundation, with this λ_U.
-fn bent(lambda_u: f64, stepping: &str) -> DiscreteProblem {
+fn bent(lambda_u: f64, stepping: &str) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 80, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = 0.1, lambda_d = 0.25, lambda_u = {lambda_u:e}, lambda_w = 0,
@@ -134,7 +134,7 @@ fn a_sound_body_takes_few_steps() {
 }
 
 /// A clamped square over a foundation under this traction on its top.
-fn pressed(load: &str, stepping: &str) -> DiscreteProblem {
+fn pressed(load: &str, stepping: &str) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = 0.01, lambda_d = 0.1, lambda_u = 250, lambda_w = 0,
@@ -182,7 +182,7 @@ fn errors_are_compared_with_the_damage_expected_at_the_end_where_it_is_known() {
         let mut scene = pressed("-2*t", "step = 'auto'").scene().clone();
         let stepping = Stepping::Auto { tolerance: 1e-3, expected };
         scene.time.iter_mut().for_each(|grid| grid.stepping = stepping);
-        let problem = DiscreteProblem::new(scene, square(6)).unwrap();
+        let problem = ObservedProblem::new(scene, square(6)).unwrap();
         let (steps, outcome) = history(&problem, SOLVERS[0]);
         (done(&steps), outcome.last.record.step, outcome.damage_error.unwrap())
     };

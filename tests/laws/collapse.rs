@@ -1,10 +1,10 @@
 //! Bodies that lose their support: the time follows from equilibrium by hand.
 
 use crate::support::{moved, problem, run, with_part};
-use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
+use signorini::{contact::SOLVERS, evolution::ObservedProblem, mesh::Mesh};
 
 /// A scene on `mesh`, with time from 0 to 1 in steps of `step`.
-fn scene(mesh: Mesh, step: &str, conditions: &str) -> DiscreteProblem {
+fn scene(mesh: Mesh, step: &str, conditions: &str) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 1e5, poisson = 0.2, plane = 'strain' }}
          time = {{ end = 1, step = {step} }}
@@ -14,7 +14,7 @@ fn scene(mesh: Mesh, step: &str, conditions: &str) -> DiscreteProblem {
 }
 
 /// `motion` is the beginning of its name: where a body may slide, the height of the point of rest is arbitrary.
-fn check(problem: &DiscreteProblem, expected: f64, motion: &str) {
+fn check(problem: &ObservedProblem, expected: f64, motion: &str) {
     let collapse = problem.collapse.expect("the body loses its support");
     assert!((collapse.time - expected).abs() < 1e-6, "{} is not {expected}", collapse.time);
     let found = collapse.motion.to_string();

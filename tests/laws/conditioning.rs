@@ -4,7 +4,7 @@ use crate::support::{
     close, close_relative, difference, distorted, history, moved, order, problem, run, square,
     try_run,
 };
-use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
+use signorini::{contact::SOLVERS, evolution::ObservedProblem, mesh::Mesh};
 use std::f64::consts::PI;
 
 /// Clamped left, pressed down on the left half of the top and pulled up on the right.
@@ -14,7 +14,7 @@ const PRESSED: &str = "
     { name = 'top', traction = [0, '-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))'] },";
 
 /// A body with Young's modulus 80 of the material `law`.
-fn body(mesh: Mesh, law: &str, more: &str, boundaries: &str) -> DiscreteProblem {
+fn body(mesh: Mesh, law: &str, more: &str, boundaries: &str) -> ObservedProblem {
     let text = format!("material = {{ young = 80, {law} }}\n{more}\nboundary = [{boundaries}]");
     problem(mesh, &text).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -33,7 +33,7 @@ fn needles(n: usize, angle: f64) -> Mesh {
 }
 
 /// A strip of length 100 and height 1 on a foundation, pressed in its middle only.
-fn strip(tolerance: f64) -> DiscreteProblem {
+fn strip(tolerance: f64) -> ObservedProblem {
     let contact = format!("contact = {{ tolerance = {tolerance:e} }}");
     let boundaries = "{ name = 'left', symmetry = true }, { name = 'bottom', gap = 0 },
         { name = 'top', traction = [0, '-max(0, 1 - abs(x - 50)/5)'] }";

@@ -10,7 +10,7 @@ use signorini::{
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
 /// A square with these boundaries.
-fn bounded(boundaries: &str) -> Result<signorini::evolution::DiscreteProblem, SetupError> {
+fn bounded(boundaries: &str) -> Result<signorini::evolution::ObservedProblem, SetupError> {
     problem(square(4), &format!("{MATERIAL}\n{boundaries}"))
 }
 

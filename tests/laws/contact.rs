@@ -5,18 +5,18 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, State},
+    evolution::{ObservedProblem, State},
 };
 
 /// A bending L over an obstacle from which its arm partly lifts off, elastic and static.
-fn lshape(step: &str, sets: &[&str]) -> DiscreteProblem {
+fn lshape(step: &str, sets: &[&str]) -> ObservedProblem {
     let uniform = ["discretisation.displacement=1", "mesh.parameters.grading=1", "mesh.size=0.5"];
     let sets = [&uniform[..], &[step], sets].concat();
     shipped("lshape", &sets)
 }
 
 /// ½ uᵀKu − fᵀu and Ku − f at the state.
-fn energy(problem: &DiscreteProblem, state: &State, u: &[f64]) -> (f64, Vec<f64>) {
+fn energy(problem: &ObservedProblem, state: &State, u: &[f64]) -> (f64, Vec<f64>) {
     let internal =
         problem.elasticity.internal_force(&problem.body, &problem.zeta_at_points(&state.zeta), u);
     let load = problem.loads.at(&problem.body, state.time);
@@ -25,7 +25,7 @@ fn energy(problem: &DiscreteProblem, state: &State, u: &[f64]) -> (f64, Vec<f64>
 }
 
 /// Makes u + v feasible: v = 0 on the clamp and (u + v)·ν ≤ g on Γ_C.
-fn project(problem: &DiscreteProblem, u: &[f64], v: &mut [f64]) {
+fn project(problem: &ObservedProblem, u: &[f64], v: &mut [f64]) {
     for [a, b] in &problem.body.mesh.curves["clamp"].edges {
         [a, b].into_iter().for_each(|&node| v[2 * node..2 * node + 2].fill(0.0));
     }

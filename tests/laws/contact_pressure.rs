@@ -7,12 +7,12 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{ContactRow, DiscreteProblem, State},
+    evolution::{ContactRow, ObservedProblem, State},
     mesh::{Curve, Mesh},
 };
 
 /// The rows of Γ_C by boundary and part.
-fn parts(problem: &DiscreteProblem, state: &State) -> Vec<Vec<ContactRow>> {
+fn parts(problem: &ObservedProblem, state: &State) -> Vec<Vec<ContactRow>> {
     let rows = problem.supports.contact.rows(&problem.body, state).0;
     let parts = rows.chunk_by(|a, b| (&a.boundary, a.part) == (&b.boundary, b.part));
     parts.map(<[ContactRow]>::to_vec).collect()
@@ -352,7 +352,7 @@ fn a_length_of_single_nodes_is_not_resolved() {
         };
         flags.iter().enumerate().map(place).collect()
     };
-    let line = signorini::problem::ContactLine::default();
+    let line = signorini::observe::ContactLine::default();
     for (flags, expected) in [
         (&[0, 0, 0][..], None),
         (&[0, 1, 0], Some(false)),

@@ -5,7 +5,7 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, Outcome, Step, Stop},
+    evolution::{ObservedProblem, Outcome, Step, Stop},
     fem::{Body, DamageCertificate, DamageSystem, Mass},
     mesh::{Mesh, Order},
     petsc::Session,
@@ -20,7 +20,7 @@ const STRAIN_SQUARED: f64 = 0.02 * 0.02 + 0.01 * 0.01 + 2.0 * 0.015 * 0.015;
 
 /// The strain above times `factor` (an expression in t) prescribed on all sides: with a
 /// uniform ζ it is the strain of the whole body.
-fn strained(mesh: Mesh, factor: &str, damage: &str, step: f64) -> DiscreteProblem {
+fn strained(mesh: Mesh, factor: &str, damage: &str, step: f64) -> ObservedProblem {
     strained_of_order(1, mesh, factor, damage, step)
 }
 
@@ -31,7 +31,7 @@ fn strained_of_order(
     factor: &str,
     damage: &str,
     step: f64,
-) -> DiscreteProblem {
+) -> ObservedProblem {
     let u = format!("['({factor})*(0.02*x + 0.02*y)', '({factor})*(0.01*x - 0.01*y)']");
     let text = format!(
         "discretisation.displacement = {order}\n{MATERIAL}\n{damage}
@@ -106,7 +106,7 @@ fn the_run_stops_at_the_threshold_with_the_last_admissible_state() {
 }
 
 /// No load and λ_D = 0: ζ only diffuses from c + a cos(πx).
-fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> DiscreteProblem {
+fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> ObservedProblem {
     let text = format!(
         "{MATERIAL}
          damage = {{ diffusion = {diffusion:?}, lambda_d = 0, lambda_u = 1, lambda_w = 0,
@@ -119,7 +119,7 @@ fn diffusing(mesh: Mesh, diffusion: f64, step: f64, mass: &str) -> DiscreteProbl
 }
 
 /// The distance in L² of ζ from 0.7 + `amplitude` cos(πx) at the end, by nodal values.
-fn distance(problem: &DiscreteProblem, amplitude: f64) -> f64 {
+fn distance(problem: &ObservedProblem, amplitude: f64) -> f64 {
     let outcome = run(problem, SOLVERS[0]);
     assert_eq!(outcome.skipped_damage_solves, 0, "ζ that is not uniform diffuses without a source");
     // ∫φ = 0: the mean stays.
@@ -167,7 +167,7 @@ const LAMBDA_U: f64 = 90.0;
 const PRESSURE: f64 = 6.0;
 
 /// Pressed on the foundation by p = t PRESSURE, ζ₀ = 0.95, in these steps to ζ_* = `threshold`.
-fn uniaxial(order: u8, mesh: Mesh, steps: &str, threshold: f64) -> DiscreteProblem {
+fn uniaxial(order: u8, mesh: Mesh, steps: &str, threshold: f64) -> ObservedProblem {
     let text = format!(
         "discretisation.displacement = {order}
          {MATERIAL}

@@ -10,8 +10,8 @@ use signorini::{
     evolution::{Choices, ContactStep, State},
     fem::{Body, Location},
     mesh::{Mesh, Order, Refinement},
+    observe::ObservedProblem,
     petsc::Session,
-    problem::DiscreteProblem,
 };
 use std::collections::HashMap;
 
@@ -33,13 +33,13 @@ fn lasting_damage(initial: &str) -> String {
 }
 
 /// ‖v‖² of nodal v.
-fn square_norm(problem: &DiscreteProblem, zeta: &[f64], v: &[f64]) -> f64 {
+fn square_norm(problem: &ObservedProblem, zeta: &[f64], v: &[f64]) -> f64 {
     let zeta = problem.zeta_at_points(zeta);
     problem.elasticity.energies(&problem.body, &zeta, v).iter().sum()
 }
 
 /// The true error of a state, relative, in the energy norm.
-fn true_error(problem: &DiscreteProblem, state: &State) -> f64 {
+fn true_error(problem: &ObservedProblem, state: &State) -> f64 {
     let (body, mut finer) = (&problem.body, Refinement::start(problem.body.mesh.clone()));
     let (mut zeta, mut parents) = (state.zeta.clone(), Vec::from_iter(0..body.triangles.len()));
     for _ in 0..2 {
@@ -51,7 +51,7 @@ fn true_error(problem: &DiscreteProblem, state: &State) -> f64 {
     }
     let mut scene = problem.scene().clone();
     scene.order = Order::Quadratic;
-    let fine = DiscreteProblem::new(scene, finer.mesh).unwrap();
+    let fine = ObservedProblem::new(scene, finer.mesh).unwrap();
     let session = Session::start(&[]).unwrap();
     let choices = Choices::of(fine.scene());
     let mut step = ContactStep::new(&session, &fine, &choices).unwrap();

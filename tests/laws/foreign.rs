@@ -15,8 +15,8 @@ use signorini::{
     evolution::{Choices, Next, Observed, Observer, Outcome, RunState, Step},
     linear::LinearSolver,
     model::{DamagePoint, DamageSource},
+    observe::ObservedProblem,
     petsc::{Session, Vector},
-    problem::DiscreteProblem,
     scene::Scene,
 };
 
@@ -54,7 +54,7 @@ fn paper(point: &DamagePoint) -> f64 {
 #[test]
 fn the_papers_source_written_by_another_author_gives_the_same_run() {
     for order in [1, 2] {
-        let problem = DiscreteProblem::new(block(order, ""), square(6)).unwrap();
+        let problem = ObservedProblem::new(block(order, ""), square(6)).unwrap();
         let session = Session::start(&[]).unwrap();
         let own = Simulation::new(&problem).law(Box::new(Source(paper))).run(&session).unwrap();
         let ours = Simulation::new(&problem).run(&session).unwrap();
@@ -71,7 +71,7 @@ fn the_papers_source_written_by_another_author_gives_the_same_run() {
 #[test]
 fn a_source_knows_its_place() {
     for order in [1, 2] {
-        let problem = DiscreteProblem::new(block(order, ""), distorted(5)).unwrap();
+        let problem = ObservedProblem::new(block(order, ""), distorted(5)).unwrap();
         let session = Session::start(&[]).unwrap();
         let law = Box::new(Source(|point: &DamagePoint| -0.5 * point.place[0]));
         let run = Simulation::new(&problem).law(law).run(&session).unwrap();
@@ -83,7 +83,7 @@ fn a_source_knows_its_place() {
 
 #[test]
 fn a_source_that_heals_or_is_no_number_is_told_with_its_place() {
-    let problem = DiscreteProblem::new(block(1, ""), square(4)).unwrap();
+    let problem = ObservedProblem::new(block(1, ""), square(4)).unwrap();
     let session = Session::start(&[]).unwrap();
     for wrong in [1e-3, f64::NAN] {
         let law = Source(move |point: &DamagePoint| match point.place {
@@ -119,7 +119,7 @@ fn a_law_without_a_number_is_refused_at_once_by_its_name() {
     let text = own_solver::SCENE.replace("mesh.file = \"block.msh\"", "");
     let lines = text.lines().filter(|line| !line.starts_with("time"));
     let text = lines.chain([adaptive]).collect::<Vec<_>>().join("\n");
-    let problem = DiscreteProblem::new(scene(&text), square(4)).unwrap();
+    let problem = ObservedProblem::new(scene(&text), square(4)).unwrap();
     let session = Session::start(&[]).unwrap();
     let run = Simulation::new(&problem).law(Box::new(Failing(&FAILED))).run(&session);
     let message = run.expect_err("the source is refused").to_string();
@@ -152,7 +152,7 @@ impl ContactSolver for Other {
 fn a_foreign_solver_that_claims_too_much_is_replaced_or_told() {
     let session = Session::start(&[]).unwrap();
     let run = |further| {
-        let problem = DiscreteProblem::new(block(1, further), square(4)).unwrap();
+        let problem = ObservedProblem::new(block(1, further), square(4)).unwrap();
         let run = Simulation::new(&problem).solver(Box::new(Other(None))).run(&session);
         run.map(|outcome| (outcome.notes(&problem), outcome))
     };
@@ -181,9 +181,9 @@ impl Observer for Keeper {
 
 #[test]
 fn a_run_with_foreign_parts_goes_on_from_a_checkpoint_bit_by_bit() {
-    let problem = DiscreteProblem::new(block(1, ""), square(6)).unwrap();
+    let problem = ObservedProblem::new(block(1, ""), square(6)).unwrap();
     let session = Session::start(&[]).unwrap();
-    fn foreign(problem: &DiscreteProblem) -> Simulation<'_> {
+    fn foreign(problem: &ObservedProblem) -> Simulation<'_> {
         Simulation::new(problem).solver(sor()).law(Box::new(Source(paper)))
     }
     let mut keeper = Keeper::default();
@@ -221,7 +221,7 @@ fn a_source_without_damage_to_do_is_refused() {
     let text = own_solver::SCENE.replace("mesh.file = \"block.msh\"", "");
     let undamaged =
         Vec::from_iter(text.lines().filter(|line| !line.starts_with("damage"))).join("\n");
-    let problem = DiscreteProblem::new(scene(&undamaged), square(4)).unwrap();
+    let problem = ObservedProblem::new(scene(&undamaged), square(4)).unwrap();
     let session = Session::start(&[]).unwrap();
     let run = Simulation::new(&problem).law(Box::new(Source(paper))).run(&session);
     let message = run.expect_err("there is no damage").to_string();

@@ -3,13 +3,13 @@
 use crate::support::{difference, moved, problem, run, square, turn};
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, SetupError},
+    evolution::{ObservedProblem, SetupError},
     mesh::{Curve, Mesh},
 };
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
-fn bounded(mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
+fn bounded(mesh: Mesh, boundaries: &str) -> Result<ObservedProblem, SetupError> {
     problem(mesh, &format!("{MATERIAL}\nboundary = [{boundaries}]"))
 }
 

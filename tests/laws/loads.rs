@@ -6,7 +6,7 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::DiscreteProblem,
+    evolution::ObservedProblem,
     fem::{Body, Edge, Elasticity, TriangleParts, add_body_force, add_traction, parabola},
     mesh::{Mesh, Order},
     model::{Material, Plane},
@@ -224,7 +224,7 @@ fn the_force_of_a_pressure_that_ends_within_an_edge_is_that_of_its_length() {
 }
 
 /// The square of n cells a side, clamped at its bottom, under `loads`, at the order `degree`.
-fn loaded(mesh: Mesh, degree: usize, loads: &str) -> DiscreteProblem {
+fn loaded(mesh: Mesh, degree: usize, loads: &str) -> ObservedProblem {
     let text = format!(
         "discretisation.displacement = {degree}
          material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
@@ -235,7 +235,7 @@ fn loaded(mesh: Mesh, degree: usize, loads: &str) -> DiscreteProblem {
 }
 
 /// ∫f_x, ∫f_y and ∫x f_y − y f_x of the load at time t.
-fn resultant(problem: &DiscreteProblem, t: f64) -> [f64; 3] {
+fn resultant(problem: &ObservedProblem, t: f64) -> [f64; 3] {
     let [[x, _, moment_x], [y, moment_y, _]] = moments(&problem.body, &problem.load(t));
     [x, y, moment_y - moment_x]
 }

@@ -3,15 +3,15 @@
 use crate::support::{close, difference, problem, run, square};
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, Outcome, SetupError},
+    evolution::{ObservedProblem, Outcome, SetupError},
 };
 
 /// A square without Γ_D over `gap`, pressed on top by 1 with the resultant at x = ½ + e.
-fn eccentric(gap: &str, e: f64) -> Result<DiscreteProblem, SetupError> {
+fn eccentric(gap: &str, e: f64) -> Result<ObservedProblem, SetupError> {
     eccentric_with(gap, e, false)
 }
 
-fn eccentric_with(gap: &str, e: f64, rescue: bool) -> Result<DiscreteProblem, SetupError> {
+fn eccentric_with(gap: &str, e: f64, rescue: bool) -> Result<ObservedProblem, SetupError> {
     let load = format!("-1 - 12*({e:e})*(x - 0.5)");
     let text = format!(
         "contact.rescue = {rescue}
@@ -26,7 +26,7 @@ fn eccentric_with(gap: &str, e: f64, rescue: bool) -> Result<DiscreteProblem, Se
 const CURVED: &str = "0.1*(x - 0.5)^2";
 
 /// Σ p and Σ p x of the contact forces.
-fn reaction(problem: &DiscreteProblem, outcome: &Outcome) -> [f64; 2] {
+fn reaction(problem: &ObservedProblem, outcome: &Outcome) -> [f64; 2] {
     let nodes = &problem.body.mesh.nodes;
     outcome.last.state.contact.iter().fold([0.0; 2], |[force, moment], point| {
         [force + point.force, moment + point.force * nodes[point.node][0]]

@@ -5,7 +5,7 @@ use crate::support::{
     DAMAGE_LAW, Random, close, distorted, largest, moved, problem, random_strains, run, square,
 };
 use signorini::{
-    evolution::{BoundViolation, DiscreteProblem, Outcome},
+    evolution::{BoundViolation, ObservedProblem, Outcome},
     fem::{Body, DamageSystem, Mass, source, source_load},
     mesh::{Mesh, Order},
     model::{DamageLaw, Fremond},
@@ -97,7 +97,7 @@ fn both_masses_integrate_constants_alike() {
 }
 
 /// A soft square in an unloaded body, ζ = `low` in it: kκ/h² is `ratio` for ten steps.
-fn soft_square(mesh: Mesh, low: f64, ratio: f64, mass: &str) -> DiscreteProblem {
+fn soft_square(mesh: Mesh, low: f64, ratio: f64, mass: &str) -> ObservedProblem {
     let distance = "max(abs(x - 0.5), abs(y - 0.5)) - 0.26";
     let initial = format!("{low} + {}*min(1, max(0, 1e6*({distance})))", 1.0 - low);
     let text = format!(

@@ -4,7 +4,7 @@ use crate::support::{bent, problem, run, square, try_run};
 use signorini::{
     contact::{SOLVERS, SolverError},
     estimate::Simulation,
-    evolution::{DiscreteProblem, RunError, SetupError},
+    evolution::{ObservedProblem, RunError, SetupError},
     petsc::Session,
 };
 
@@ -12,7 +12,7 @@ const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress
 
 /// The square on a foundation `gap` below it, supported sideways by an axis, pressed by
 /// `traction`; static.
-fn pressed(gap: f64, traction: &str) -> Result<DiscreteProblem, SetupError> {
+fn pressed(gap: f64, traction: &str) -> Result<ObservedProblem, SetupError> {
     let text = format!(
         "{MATERIAL}
          boundary = [{{ name = 'left', symmetry = true }}, {{ name = 'bottom', gap = {gap} }},
@@ -23,7 +23,7 @@ fn pressed(gap: f64, traction: &str) -> Result<DiscreteProblem, SetupError> {
 
 #[test]
 fn large_strains_rotations_and_ways_are_noted() {
-    let notes = |problem: DiscreteProblem| run(&problem, SOLVERS[0]).notes(&problem);
+    let notes = |problem: ObservedProblem| run(&problem, SOLVERS[0]).notes(&problem);
     // |∇u| = (p/E) √(1 + ν²).
     assert_eq!(notes(pressed(0.0, "-9").unwrap()), [""; 0]);
     let large = notes(pressed(0.0, "-10").unwrap());
@@ -127,7 +127,7 @@ fn an_answer_without_any_motion_is_noted_and_the_end_of_a_cycle_is_not() {
         problem(square(4), &text).unwrap()
     };
     let in_time = |load: &str| damaged(load, "");
-    let notes = |problem: DiscreteProblem| run(&problem, SOLVERS[0]).notes(&problem);
+    let notes = |problem: ObservedProblem| run(&problem, SOLVERS[0]).notes(&problem);
     for still in [pressed(1.0, "0").unwrap(), in_time("0")] {
         let notes = notes(still);
         assert!(notes.len() == 1 && notes[0].starts_with("nothing moves:"), "{notes:?}");

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use signorini::{
     contact::SOLVERS,
     estimate::RecoveredStrains,
-    evolution::DiscreteProblem,
+    evolution::ObservedProblem,
     fem::Elements,
     mesh::{Mesh, twice_area},
 };
@@ -33,7 +33,7 @@ fn exact([x, y]: [f64; 2]) -> [f64; 2] {
 /// The scene in which u is the solution for ζ = 1 − dx, by f_B = −div(ζ σ(u)):
 /// −div σ = −μ Δu − (λ+μ) ∇div u with div u = (A + CB) cos ax cos by, Δu = −(A² + B²) u,
 /// and −∇ζ·σ = d (σ_xx, σ_xy).
-fn manufactured(mesh: Mesh, plane: &str, d: f64, degree: u8) -> DiscreteProblem {
+fn manufactured(mesh: Mesh, plane: &str, d: f64, degree: u8) -> ObservedProblem {
     let mu = 0.5 * YOUNG / (1.0 + POISSON);
     let lambda = match plane {
         "stress" => YOUNG * POISSON / (1.0 - POISSON * POISSON),
@@ -96,7 +96,7 @@ fn quadrature() -> Vec<([f64; 3], f64)> {
 
 /// ‖u − u_h‖ in L², |u − u_h| in H¹ and ‖u − u_h‖ in the energy norm with ζ = 1 − dx, on straight
 /// triangles.
-fn errors(problem: &DiscreteProblem, u: &[f64], d: f64) -> [f64; 3] {
+fn errors(problem: &ObservedProblem, u: &[f64], d: f64) -> [f64; 3] {
     let (body, mut squares) = (&problem.body, [0.0; 3]);
     let stiffness = problem.scene().material.stiffness();
     for (t, corners) in body.mesh.triangles.iter().enumerate() {

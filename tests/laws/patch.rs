@@ -5,7 +5,7 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, State},
+    evolution::{ObservedProblem, State},
     mesh::Mesh,
     model::Plane,
 };
@@ -53,7 +53,7 @@ fn check_pressures(state: &State, pressure: f64) {
 
 /// Pressed by p from the top on a foundation, with a symmetry axis at the left; the whole
 /// turned by `angle` about the origin.
-fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> DiscreteProblem {
+fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> ObservedProblem {
     let text = format!(
         "{more}\n{}
          boundary = [
@@ -68,7 +68,7 @@ fn pressed(mesh: Mesh, angle: f64, plane: Plane, p: f64, more: &str) -> Discrete
 }
 
 /// u = p (ε_xx x, ε_yy y) turned by `angle`.
-fn exact(problem: &DiscreteProblem, angle: f64, p: f64, [yy, xx]: [f64; 2]) -> Vec<f64> {
+fn exact(problem: &ObservedProblem, angle: f64, p: f64, [yy, xx]: [f64; 2]) -> Vec<f64> {
     let place = |x: &[f64; 2]| {
         let [x, y] = turn(-angle, *x);
         turn(angle, [p * xx * x, p * yy * y])

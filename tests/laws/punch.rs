@@ -3,7 +3,7 @@
 use crate::support::{adapted, order, run, scene, square, with_part};
 use signorini::{
     contact::SOLVERS,
-    evolution::DiscreteProblem,
+    evolution::ObservedProblem,
     scene::{Expression, Scene},
 };
 use std::f64::consts::PI;
@@ -92,7 +92,7 @@ fn the_pressure_under_a_punch_comes_at_the_rate_of_smooth_solutions() {
     for accuracy in [0.03, 0.01, 3e-3] {
         let first = with_part(square(8), "bottom", "punch", |[x, _]| x <= WIDTH);
         let mesh = adapted(&exact.scene(), first, accuracy).mesh;
-        let problem = DiscreteProblem::new(exact.scene(), mesh).unwrap();
+        let problem = ObservedProblem::new(exact.scene(), mesh).unwrap();
         let last = run(&problem, SOLVERS[0]).last;
         // With a gap of zero fᵀu = ‖u‖² in the energy norm, and ‖u − u_h‖² ≤ ‖u‖² − ‖u_h‖².
         let error = (1.0 - last.record.work / exact.work()).sqrt();

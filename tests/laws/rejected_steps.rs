@@ -4,13 +4,13 @@ use crate::support::{Random, close, difference, distorted, history, problem, sam
 use signorini::{
     contact::SOLVERS,
     estimate::Simulation,
-    evolution::{Choices, ContactStep, DiscreteProblem, RunError, Step},
+    evolution::{Choices, ContactStep, ObservedProblem, RunError, Step},
     petsc::Session,
 };
 
 /// Pressed on a wavy foundation until t = 1, harder on the left; then torn off it on the right.
 /// Where the left is an axis, only contact supports the body.
-fn scene(left: &str, iterations: &str) -> DiscreteProblem {
+fn scene(left: &str, iterations: &str) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'strain' }}
          time = {{ end = 2, step = 0.1 }}
@@ -25,16 +25,18 @@ fn scene(left: &str, iterations: &str) -> DiscreteProblem {
 }
 
 /// ζ around `mean` at the nodes.
-fn zeta(problem: &DiscreteProblem, mean: f64) -> Vec<f64> {
+fn zeta(problem: &ObservedProblem, mean: f64) -> Vec<f64> {
     let field = Random::new(7).field(problem.body.mesh.nodes.len());
     field.iter().map(|v| mean + 0.1 * v).collect()
 }
 
 /// Two accepted steps by one solver, with `tries` (time, ζ, whether it succeeds) made between them
 /// and not accepted; the second step.
-fn second_step(problem: &DiscreteProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
+fn second_step(problem: &ObservedProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
     let session = Session::start(&[]).unwrap();
-    let mut contact_step = ContactStep::new(&session, problem, &Choices::named(solver)).unwrap();
+    let mut contact_step =
+        ContactStep::new(&session, problem, &Choices::of(problem.scene()).solver_named(solver))
+            .unwrap();
     contact_step.solve(1, 0.9, &zeta(problem, 0.9)).unwrap();
     contact_step.accept(0.9).unwrap();
     for (time, zeta, succeeds) in tries {
@@ -85,7 +87,7 @@ fn a_rejected_step_leaves_no_trace() {
 #[test]
 fn a_rescued_step_that_is_rejected_leaves_no_trace() {
     let (solver, left) = ("penalty-duality", "displacement = [0, 0]");
-    let torn = |problem: &DiscreteProblem, succeeds| vec![(1.8, zeta(problem, 0.4), succeeds)];
+    let torn = |problem: &ObservedProblem, succeeds| vec![(1.8, zeta(problem, 0.4), succeeds)];
     let alone = scene(left, "60\n contact.rescue = false");
     second_step(&alone, solver, &torn(&alone, false));
     let problem = scene(left, "60\n contact.rescue = true");
@@ -98,7 +100,7 @@ fn a_rescued_step_that_is_rejected_leaves_no_trace() {
 /// Pressed on the foundation and let go by a solver of little patience: penalty-duality without
 /// acceleration needs fewer iterations the nearer the last step is, and about 375 for one of the last
 /// of a few steps, in which the foundation is nearly left.
-fn released(stepping: &str, iterations: usize) -> DiscreteProblem {
+fn released(stepping: &str, iterations: usize) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
          damage = {{ diffusion = 0.2, lambda_d = 0, lambda_u = 1, lambda_w = 0,

@@ -1,11 +1,11 @@
 //! A solver that stops short is rescued by another one, and the run says so.
 
 use crate::support::{difference, problem, run, try_run};
-use signorini::{contact::SOLVERS, evolution::DiscreteProblem, mesh::Mesh};
+use signorini::{contact::SOLVERS, evolution::ObservedProblem, mesh::Mesh};
 
 /// A thin strip that contact alone keeps from sinking and tilting: its bending is very soft against its
 /// other stiffness, and few iterations of penalty-duality do not get far.
-fn loose_strip(rescue: bool, iterations: usize) -> DiscreteProblem {
+fn loose_strip(rescue: bool, iterations: usize) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0.3, plane = 'stress' }}
          contact.rescue = {rescue}

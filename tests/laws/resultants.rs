@@ -9,17 +9,17 @@ use crate::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, SetupError},
+    evolution::{ObservedProblem, SetupError},
     mesh::{Mesh, Order},
 };
 use std::{collections::BTreeMap, f64::consts::PI};
 
 /// The figures of the last state, by name.
-fn figures(problem: &DiscreteProblem) -> BTreeMap<String, f64> {
+fn figures(problem: &ObservedProblem) -> BTreeMap<String, f64> {
     support::figures(problem, &run(problem, SOLVERS[0]).last)
 }
 
-fn of_order(mesh: Mesh, order: Order, text: &str) -> Result<DiscreteProblem, SetupError> {
+fn of_order(mesh: Mesh, order: Order, text: &str) -> Result<ObservedProblem, SetupError> {
     let material = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
     let text = format!("discretisation.displacement = {}\n{material}\n{text}", 1 + order as u8);
     problem(mesh, &text)
@@ -70,7 +70,7 @@ fn forces_that_balance_have_a_scale_and_need_no_finer_mesh() {
             assert!(bar.bar <= 1e-6 * bar.scale, "{bar:?}\n{text}");
         }
         // The resultant of each side, and the stress at the probe, are rounding or as large as the load.
-        let problem = DiscreteProblem::new(scene, mesh).unwrap();
+        let problem = ObservedProblem::new(scene, mesh).unwrap();
         for (name, value) in figures(&problem) {
             let is_force =
                 [".force", "pressure", "stress", "mises"].iter().any(|of| name.contains(of));

@@ -13,7 +13,7 @@ use signorini::{
         RowLaw, SOLVERS, nonnegative,
     },
     estimate::Simulation,
-    evolution::{DiscreteProblem, RunError, SetupError},
+    evolution::{ObservedProblem, RunError, SetupError},
     fem::{Body, RigidMotion},
     linear::LinearSolver,
     mesh::{Mesh, Order, Refinement},
@@ -22,19 +22,19 @@ use signorini::{
 
 const MATERIAL: &str = "material = { young = 100, poisson = 0.3, plane = 'stress' }";
 
-fn bounded(mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
+fn bounded(mesh: Mesh, boundaries: &str) -> Result<ObservedProblem, SetupError> {
     of_order(1, mesh, boundaries)
 }
 
 /// The same with displacements of this order.
-fn of_order(order: u8, mesh: Mesh, boundaries: &str) -> Result<DiscreteProblem, SetupError> {
+fn of_order(order: u8, mesh: Mesh, boundaries: &str) -> Result<ObservedProblem, SetupError> {
     let text = format!("discretisation.displacement = {order}\n{MATERIAL}");
     problem(mesh, &format!("{text}\nboundary = [{boundaries}]"))
 }
 
 /// The motions of a scene that stands.
 fn motions(mesh: Mesh, boundaries: &str) -> RigidMotions {
-    bounded(mesh, boundaries).unwrap_or_else(|e| panic!("{e}")).motions
+    bounded(mesh, boundaries).unwrap_or_else(|e| panic!("{e}")).motions.clone()
 }
 
 /// The motion that the load drives, in words.

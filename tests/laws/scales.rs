@@ -7,12 +7,12 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::DiscreteProblem,
+    evolution::ObservedProblem,
     mesh::{Curve, Mesh},
 };
 
 /// A block on rollers at its left, falling onto a level foundation under its weight.
-fn falling(gap: f64) -> DiscreteProblem {
+fn falling(gap: f64) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 30e9, poisson = 0.2, plane = 'strain' }}
          body.force = [0, -25e3]
@@ -70,7 +70,7 @@ fn a_load_that_passes_zero_leaves_what_a_linear_body_leaves_nothing() {
 }
 
 /// A wedge, its tip at the origin, between two plates along its axis; turned by an angle.
-fn wedge(angle: f64, slope: f64, gap: f64) -> DiscreteProblem {
+fn wedge(angle: f64, slope: f64, gap: f64) -> ObservedProblem {
     let n = 8;
     // Row i of the wedge has i + 1 nodes.
     let first = |i: usize| i * (i + 1) / 2;

@@ -4,12 +4,12 @@
 use crate::support::{close, close_relative, difference, history, largest, shipped, shipped_names};
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, Outcome, Step},
+    evolution::{ObservedProblem, Outcome, Step},
 };
 use std::collections::BTreeSet;
 
 /// Overrides that make a shipped scene quick.
-fn quick(name: &str) -> DiscreteProblem {
+fn quick(name: &str) -> ObservedProblem {
     let sets: &[&str] = match name {
         // It breaks at t = 0.04 on this mesh, in the eighth of these steps.
         "square" => &["mesh.size=0.0625", "time.end=0.05", "time.step=0.005"],
@@ -23,7 +23,7 @@ fn quick(name: &str) -> DiscreteProblem {
 }
 
 /// The same with quadratic displacements.
-fn quick_quadratic(name: &str) -> DiscreteProblem {
+fn quick_quadratic(name: &str) -> ObservedProblem {
     let sets: &[&str] = match name {
         "square" => &["mesh.size=0.125", "time.end=0.05", "time.step=0.005"],
         "hertz" => &["mesh.size=0.016", "mesh.parameters.grading=25"],
@@ -39,7 +39,7 @@ fn quick_quadratic(name: &str) -> DiscreteProblem {
 type Answers = [(Vec<Step>, Outcome); SOLVERS.len()];
 
 /// All solvers give the same answer of this scene, which is returned.
-fn agreed(name: &str, problem: &DiscreteProblem) -> Answers {
+fn agreed(name: &str, problem: &ObservedProblem) -> Answers {
     let all = SOLVERS.map(|solver| history(problem, solver));
     for (solver, (_, outcome)) in SOLVERS.iter().zip(&all) {
         assert!(outcome.kkt.within(1e-10), "{name}, {solver}: {}", outcome.kkt);
@@ -109,7 +109,7 @@ fn contact_travels_where_a_scene_says_so() {
 }
 
 /// The node of `problem` at a point.
-fn node_at(problem: &DiscreteProblem, [x, y]: [f64; 2]) -> usize {
+fn node_at(problem: &ObservedProblem, [x, y]: [f64; 2]) -> usize {
     let near = |p: &[f64; 2]| (p[0] - x).hypot(p[1] - y) < 1e-8;
     problem.body.nodes.points.iter().position(near).unwrap_or_else(|| panic!("no node at {x}, {y}"))
 }

@@ -3,8 +3,8 @@
 
 use crate::support::{moved, problem, square, unstructured};
 use signorini::{
+    advice::Singular,
     mesh::{Curve, Mesh},
-    problem::Singular,
 };
 use std::f64::consts::FRAC_PI_2;
 

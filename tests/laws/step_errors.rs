@@ -6,18 +6,18 @@ use crate::support::{distorted, history, problem, run, shipped};
 use signorini::{
     accuracy,
     contact::SOLVERS,
-    evolution::{Choices, DiscreteProblem, Outcome},
+    evolution::{Choices, ObservedProblem, Outcome},
     petsc::Session,
 };
 use std::f64::consts::PI;
 
 /// A square with these laws of damage and supports, in uniform two-step backward differences.
-fn uniform(damage: &str, boundary: &str) -> DiscreteProblem {
+fn uniform(damage: &str, boundary: &str) -> ObservedProblem {
     stepped(damage, boundary, "step = 0.04, scheme = 'bdf2'")
 }
 
 /// The same in other steps.
-fn stepped(damage: &str, boundary: &str, stepping: &str) -> DiscreteProblem {
+fn stepped(damage: &str, boundary: &str, stepping: &str) -> ObservedProblem {
     let text = format!(
         "material = {{ young = 100, poisson = 0, plane = 'stress' }}
          damage = {{ diffusion = 1, strain_cap = 1000, threshold = 0.01,
@@ -33,7 +33,7 @@ fn stepped(damage: &str, boundary: &str, stepping: &str) -> DiscreteProblem {
 }
 
 /// The estimated error of the damage over the true one, where ζ(1) = `exact`.
-fn estimated_over_true(problem: &DiscreteProblem, exact: f64) -> f64 {
+fn estimated_over_true(problem: &ObservedProblem, exact: f64) -> f64 {
     let (steps, outcome) = history(problem, SOLVERS[0]);
     let last = steps.last().unwrap().record;
     assert!((last.zeta_mean - last.zeta_min).abs() < 1e-12 && last.time == 1.0);
@@ -111,7 +111,7 @@ fn the_error_is_known_where_a_singular_point_drives_the_damage() {
 }
 
 /// A run with its error bars, and the values of max |u| of all steps.
-fn with_bars(problem: &DiscreteProblem) -> (Outcome, Vec<f64>) {
+fn with_bars(problem: &ObservedProblem) -> (Outcome, Vec<f64>) {
     let (mesh, scene) = (distorted(2), problem.scene());
     let session = Session::start(&[]).unwrap();
     let measured =

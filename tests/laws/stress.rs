@@ -7,9 +7,9 @@ use crate::support::{
 };
 use signorini::{
     contact::SOLVERS,
-    evolution::DiscreteProblem,
+    evolution::ObservedProblem,
     mesh::{Mesh, Order},
-    problem::{NodalStress, principal, principal_direction},
+    observe::{NodalStress, principal, principal_direction},
 };
 use std::f64::consts::FRAC_PI_2;
 
@@ -17,7 +17,7 @@ const YOUNG: f64 = 50.0;
 const POISSON: f64 = 0.3;
 
 /// Prescribed displacements on all sides of a square, without a load.
-fn prescribed(mesh: Mesh, degree: Order, plane: &str, [x, y]: [&str; 2]) -> DiscreteProblem {
+fn prescribed(mesh: Mesh, degree: Order, plane: &str, [x, y]: [&str; 2]) -> ObservedProblem {
     let degree = if degree == Order::Linear { 1 } else { 2 };
     let sides = ["left", "right", "top", "bottom"];
     let sides = sides.map(|name| format!("{{ name = '{name}', displacement = ['{x}', '{y}'] }}"));
@@ -31,7 +31,7 @@ fn prescribed(mesh: Mesh, degree: Order, plane: &str, [x, y]: [&str; 2]) -> Disc
 }
 
 /// The points and their stresses in the solution of a static problem.
-fn stresses(problem: &DiscreteProblem) -> Vec<([f64; 2], [f64; 4])> {
+fn stresses(problem: &ObservedProblem) -> Vec<([f64; 2], [f64; 4])> {
     let state = run(problem, SOLVERS[0]).last.state;
     let nodal = problem.nodal_stress();
     let stresses = nodal.stresses(&NodalStress::strained(problem, &state), None).unwrap();

@@ -10,7 +10,7 @@ use signorini::{
     accuracy::{self, Adapted},
     contact::SOLVERS,
     estimate::Simulation,
-    evolution::{Choices, DiscreteProblem, Outcome, RunError, SetupError, Step},
+    evolution::{Choices, ObservedProblem, Outcome, RunError, SetupError, Step},
     mesh::{self, Curve, Mesh, Order},
     model::DamageLaw,
     petsc::Session,
@@ -152,22 +152,22 @@ pub fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
 
 /// The answer of the first solver.
 pub fn solved(scene: Scene, mesh: Mesh) -> Outcome {
-    let problem = DiscreteProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
+    let problem = ObservedProblem::new(scene, mesh).unwrap_or_else(|error| panic!("{error}"));
     run(&problem, SOLVERS[0])
 }
 
 /// The scene `text` (TOML without `mesh`) on `mesh`.
-pub fn problem(mesh: Mesh, text: &str) -> Result<DiscreteProblem, SetupError> {
-    DiscreteProblem::new(scene(text), mesh)
+pub fn problem(mesh: Mesh, text: &str) -> Result<ObservedProblem, SetupError> {
+    ObservedProblem::new(scene(text), mesh)
 }
 
 /// A shipped scene with `--set` arguments.
-pub fn shipped(name: &str, sets: &[&str]) -> DiscreteProblem {
+pub fn shipped(name: &str, sets: &[&str]) -> ObservedProblem {
     shipped_with(name, sets, ["", ""])
 }
 
 /// The same with one text of its geometry replaced by another.
-pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> DiscreteProblem {
+pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> ObservedProblem {
     let geo = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo");
     // Meshes appear beside the geometry, so it is copied.
     let folder = folder();
@@ -186,7 +186,7 @@ pub fn shipped_with(name: &str, sets: &[&str], [old, new]: [&str; 2]) -> Discret
         fs::write(&scene.mesh.file, geometry.replace(old, new)).unwrap();
     }
     let mesh = mesh::load(&scene.mesh.file, &scene.mesh.parameters, scene.order).unwrap();
-    DiscreteProblem::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
+    ObservedProblem::new(scene, mesh).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// The names of all shipped scenes.
@@ -201,7 +201,7 @@ pub fn shipped_names() -> Vec<String> {
 }
 
 /// All accepted steps and the outcome.
-pub fn history(problem: &DiscreteProblem, solver: &str) -> (Vec<Step>, Outcome) {
+pub fn history(problem: &ObservedProblem, solver: &str) -> (Vec<Step>, Outcome) {
     let session = Session::start(&[]).unwrap();
     let mut steps = Vec::new();
     let mut keep = |step: &Step| {
@@ -215,12 +215,12 @@ pub fn history(problem: &DiscreteProblem, solver: &str) -> (Vec<Step>, Outcome) 
 }
 
 /// The outcome alone.
-pub fn run(problem: &DiscreteProblem, solver: &str) -> Outcome {
+pub fn run(problem: &ObservedProblem, solver: &str) -> Outcome {
     history(problem, solver).1
 }
 
 /// The outcome or why there is none.
-pub fn try_run(problem: &DiscreteProblem, solver: &str) -> Result<Outcome, RunError> {
+pub fn try_run(problem: &ObservedProblem, solver: &str) -> Result<Outcome, RunError> {
     let session = Session::start(&[]).unwrap();
     Simulation::new(problem).solver_named(solver).run(&session)
 }
@@ -278,7 +278,7 @@ fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> f64 {
 }
 
 /// The figures of a step by their names.
-pub fn figures(problem: &DiscreteProblem, step: &Step) -> BTreeMap<String, f64> {
+pub fn figures(problem: &ObservedProblem, step: &Step) -> BTreeMap<String, f64> {
     let values = step.figures.iter().map(|of| of.value);
     problem.figures.iter().map(|of| of.name.clone()).zip(values).collect()
 }

@@ -27,8 +27,9 @@ use crate::{
     fem::{Body, for_elements},
     mesh::{Order, sorted},
     model::Material,
+    observe::ObservedProblem,
     petsc::PetscError,
-    problem::{DiscreteProblem, ElementLoads, State},
+    problem::{ElementLoads, State},
     scene::Condition,
 };
 use composite::{Frame, LoadedTriangle, SideForces};
@@ -94,7 +95,7 @@ pub(crate) fn proved_error(
 
 /// A stress τ in equilibrium with the loads, near that of a computed state, and its pressure p ≥ 0 on Γ_C.
 pub struct EquilibratedStress<'a> {
-    problem: &'a DiscreteProblem,
+    problem: &'a ObservedProblem,
     triangles: Vec<StressedTriangle>,
     stars: Vec<Star>,
     boundary: HashMap<[usize; 2], BoundaryEdge>,
@@ -117,7 +118,7 @@ impl<'a> EquilibratedStress<'a> {
         contact_step: &mut ContactStep<'a>,
         state: &State,
     ) -> Result<Result<Self, Unproved>, PetscError> {
-        let problem = contact_step.problem();
+        let problem = contact_step.problem;
         let (body, elasticity) = (&problem.body, &problem.elasticity);
         let (partition, points) = (&body.nodes.partition, problem.zeta_at_points(&state.zeta));
         let comm = partition.comm();
@@ -194,7 +195,7 @@ impl<'a> EquilibratedStress<'a> {
     pub fn improve(&mut self) {
         let Self { triangles, stars, boundary, tractions, .. } = self;
         let body = &self.problem.body;
-        let (comm, known) = (body.nodes.partition.comm(), (&triangles[..], &stars[..], &*boundary));
+        let (comm, known) = (body.comm(), (&triangles[..], &stars[..], &*boundary));
         let mut improve = |is_wanted: &dyn Fn(&Star) -> bool, part: f64| {
             let before = (!comm.is_serial()).then(|| tractions.clone());
             let (linear, quadratic) = (&composite::LINEAR, &composite::QUADRATIC);
@@ -227,13 +228,13 @@ impl<'a> EquilibratedStress<'a> {
                 Order::Quadratic => composite::QUADRATIC.square(&triangle),
             }
         };
-        body.nodes.partition.comm().total((0..body.own_triangles).map(square).sum())
+        body.comm().total((0..body.own_triangles).map(square).sum())
     }
 
     /// The bound on ‖u − u_h‖ / ‖u_h‖ for the `square` of τ. Collective.
     fn bound(&self, square: f64) -> f64 {
         let contact = 2.0 * self.edges.iter().map(ContactEdge::work).sum::<f64>();
-        let contact = self.problem.body.nodes.partition.comm().total(contact);
+        let contact = self.problem.body.comm().total(contact);
         ((square + contact).sqrt() + self.of_moved) / self.norm
     }
 
@@ -303,7 +304,7 @@ fn sides(body: &Body, stars: &[Star]) -> HashMap<[usize; 2], Side> {
 /// The triangles with stresses that have the same forces at the nodes as those of the stiffness matrix: affine between the vertices
 /// or the quadrature points.
 fn stressed(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     [zeta_at_points, zeta_at_vertices]: [&[f64]; 2],
     u: &[f64],
     loads: &ElementLoads,
@@ -347,7 +348,7 @@ fn stressed(
 
 /// The forces of loads and contact on the edges of the boundary, and the directions in which supports hold them.
 fn boundary(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     edges: &[ContactEdge],
     sides: &HashMap<[usize; 2], Side>,
     loads: &ElementLoads,
@@ -390,7 +391,7 @@ fn boundary(
 
 /// The sum of the parts of the forces that all ranks have. Collective.
 fn summed(body: &Body, parts: Vec<SideForces>) -> Vec<SideForces> {
-    let comm = body.nodes.partition.comm();
+    let comm = body.comm();
     if comm.is_serial() {
         return parts;
     }

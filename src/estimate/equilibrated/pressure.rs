@@ -7,7 +7,8 @@
 use super::Side;
 use crate::{
     fem::RigidMotion,
-    problem::{ContactRow, DiscreteProblem, State, rows_of},
+    observe::{ContactRow, ObservedProblem, rows_of},
+    problem::State,
     scene::Boundary,
 };
 use nalgebra::{DMatrix, DVector, Vector2};
@@ -59,7 +60,7 @@ struct Piece {
 impl Foundation {
     /// The boundaries with a gap. `sides` are the edges of the boundary. Collective.
     pub(super) fn all(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         state: &State,
         sides: &HashMap<[usize; 2], Side>,
     ) -> Vec<Self> {
@@ -75,7 +76,7 @@ impl Foundation {
 
     /// The boundary `name` with its `rows`, which every rank has, and with the normal of its gap if that is fixed.
     fn new(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         rows: &[ContactRow],
         (name, normal): (&str, Option<[f64; 2]>),
         sides: &HashMap<[usize; 2], Side>,
@@ -107,7 +108,7 @@ impl Foundation {
         });
         let edges = Vec::from_iter(edges);
         // The first rank counts the rows.
-        let is_first = body.nodes.partition.comm().is_root();
+        let is_first = body.comm().is_root();
         let force = |row: &ContactRow| {
             ([row.x, row.y], -row.force * Vector2::new(row.normal_x, row.normal_y))
         };
@@ -155,7 +156,7 @@ fn nearest(rows: &[ContactRow], pieces: &[Piece]) -> Vec<f64> {
 impl ContactEdge {
     /// The edge between two nodes, the body on its left, with the rows of its piece and their pressures.
     fn new(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         (rows, pressures): (&[ContactRow], &[f64]),
         piece: &Piece,
         [start, end]: [usize; 2],
@@ -244,7 +245,7 @@ impl ContactEdge {
 }
 
 /// The forces of the pressures at the nodes.
-pub(super) fn nodal_forces(problem: &DiscreteProblem, edges: &[ContactEdge]) -> Vec<f64> {
+pub(super) fn nodal_forces(problem: &ObservedProblem, edges: &[ContactEdge]) -> Vec<f64> {
     let mut forces = vec![0.0; 2 * problem.body.nodes.points.len()];
     for edge in edges {
         let [a, b, bubble] = edge.all_forces();
@@ -263,7 +264,7 @@ pub(super) fn nodal_forces(problem: &DiscreteProblem, edges: &[ContactEdge]) -> 
 /// Gives the pressures of each foundation the resultant and the moment of its reactions, and those of all foundations the ones that
 /// balance the `load` on the motions that contact alone prevents. False if no such p ≥ 0 is found. Collective.
 pub(super) fn balance(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     foundations: &mut [Foundation],
     load: &[f64],
 ) -> bool {
@@ -276,7 +277,7 @@ pub(super) fn balance(
             target +=
                 DVector::from_iterator(3, all.iter().map(|m| force.dot(&Vector2::from(m.at(*at)))));
         }
-        body.nodes.partition.comm().sum(target.as_mut_slice());
+        body.comm().sum(target.as_mut_slice());
         scale(problem, &mut edges.iter_mut().collect::<Vec<_>>(), &all, &target);
     }
     let target = -problem.motions.work(body, |i| [load[2 * i], load[2 * i + 1]]);
@@ -287,14 +288,14 @@ pub(super) fn balance(
 /// Scales the pressures by 1 + Σ c_k ν·m_k so that their work on the motions m_k is the `target`. Where this p is negative, it
 /// becomes 0, and the rest is scaled again. Is the target met? Collective.
 fn scale(
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     edges: &mut [&mut ContactEdge],
     motions: &[RigidMotion],
     target: &DVector<f64>,
 ) -> bool {
     /// In each round but the last one some p becomes 0. Bodies that need more rounds have no bound.
     const TIMES: usize = 10;
-    let (comm, count) = (problem.body.nodes.partition.comm(), motions.len());
+    let (comm, count) = (problem.body.comm(), motions.len());
     // ν·m at the place `at`, with ν of the place k of an edge.
     let along = |edge: &ContactEdge, k: usize, at: [f64; 2]| {
         DVector::from_fn(count, |i, _| edge.normals[k].dot(&Vector2::from(motions[i].at(at))))

@@ -37,7 +37,7 @@ pub(super) fn of(problem: &DiscreteProblem, edges: &[ContactEdge], time: f64) ->
             }
         }
     }
-    let comm = body.nodes.partition.comm();
+    let comm = body.comm();
     let parts = [
         (loads, "loads vary within triangles"),
         (values, "gaps or displacements vary between nodes"),

@@ -71,7 +71,7 @@ impl Accuracy {
     }
 }
 
-impl<'a> ContactStep<'a> {
+impl ContactStep<'_> {
     /// After a run: estimates the errors of its last step, relative to the maximum displacement. The step with the
     /// maximum stationarity residual follows if the first error times the ratio of the residuals comes near the
     /// promised error. The factor of the last solve is usually good enough.
@@ -93,7 +93,7 @@ impl<'a> ContactStep<'a> {
     /// residual forces. Collective.
     fn of_state(&mut self, state: &State, max: f64) -> Result<Accuracy, PetscError> {
         let problem = self.problem;
-        let DiscreteProblem { body, constraints, .. } = problem;
+        let DiscreteProblem { body, constraints, .. } = &**problem;
         let partition = &body.nodes.partition;
         let mut accuracy = Accuracy { time: state.time, ..Accuracy::default() };
         if max == 0.0 || partition.max_norm(&state.u) == 0.0 {
@@ -126,14 +126,14 @@ impl<'a> ContactStep<'a> {
         limit: impl Fn(f64) -> f64,
     ) -> Result<(SolveReport, Vec<f64>), PetscError> {
         let Self { problem, stiffness, elastic, load, c, .. } = self;
-        let DiscreteProblem { body, constraints, .. } = problem;
+        let DiscreteProblem { body, constraints, .. } = &***problem;
         constraints.bases.force_to_local(&mut forces);
         constraints.bases.zero_fixed(&mut forces);
         held.iter().for_each(|&dof| forces[dof] = 0.0);
         load.set(&forces[..load.owned()])?;
         c.write(|u| u.fill(0.0))?;
         stiffness.set_damage(body, zeta);
-        let comm = body.nodes.partition.comm();
+        let comm = body.comm();
         let system = LinearSystem {
             prescribed: comm.any(!held.is_empty()).then_some(held),
             scale: stiffness.scale,
@@ -147,7 +147,7 @@ impl<'a> ContactStep<'a> {
     /// Bounded unknowns that prevent the motions which contact alone prevents, one for each: the largest pivots of Gaussian
     /// elimination on their u·ν, in increasing order. Collective.
     pub(crate) fn holding(&self) -> Vec<usize> {
-        let (comm, mut rows) = (self.problem.body.nodes.partition.comm(), self.rigid.clone());
+        let (comm, mut rows) = (self.problem.body.comm(), self.rigid.clone());
         let mut held = Vec::new();
         for k in 0..rows.ncols() {
             let size = |i: &usize| rows[(*i, k)].abs();
@@ -164,10 +164,5 @@ impl<'a> ContactStep<'a> {
         }
         held.sort_unstable();
         held
-    }
-
-    /// The problem.
-    pub(crate) fn problem(&self) -> &'a DiscreteProblem {
-        self.problem
     }
 }

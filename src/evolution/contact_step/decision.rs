@@ -41,9 +41,12 @@ pub(super) struct Attempt {
     /// The cost of the last solve, and of all attempts of this solver.
     pub(super) spent: ContactReport,
     pub(super) report: ContactReport,
-    /// The error of the solver whose rescuer attempts the step.
-    rescued: Option<ContactError>,
+    /// The failure of the solver whose rescuer attempts the step.
+    rescued: Option<Failure>,
 }
+
+/// The error of an attempt, and the tolerance that double precision can reach if this explains the error.
+type Failure = (ContactError, Option<f64>);
 
 /// The decision after an attempt.
 #[expect(clippy::large_enum_variant, reason = "one at a time lives, in a loop of few turns")]
@@ -53,7 +56,7 @@ pub(super) enum Decision {
     /// This attempt follows.
     Again(Attempt),
     /// The step has no answer.
-    GiveUp(ContactError),
+    GiveUp(Failure),
 }
 
 impl Attempt {
@@ -103,15 +106,15 @@ impl ContactStep<'_> {
             || (attempt.number > 1 || stopped.is_some())
                 && self.is_exact_to_rounding(&candidate, error);
         let method = self.solvers[attempt.solver].name();
-        let error = match stopped {
-            Some(error) if !is_accepted => self.limited(error, &candidate),
+        let failure = match stopped {
+            Some(error) if !is_accepted => (error, self.attainable(&candidate)),
             // If K is indefinite, a KKT point need not be a minimum. Only some solvers notice this.
-            _ if candidate.is_indefinite() => ContactError::NotDefinite { method },
+            _ if candidate.is_indefinite() => (ContactError::NotDefinite { method }, None),
             _ if is_accepted => return Ok(Decision::Accept(attempt, candidate)),
             _ if is_last || candidate.kkt.worst().is_nan() => {
                 let residuals = candidate.kkt;
                 let error = ContactError::NotCertified { method, tolerance: required, residuals };
-                self.limited(error, &candidate)
+                (error, self.attainable(&candidate))
             }
             _ => {
                 let mut next = attempt.again(&candidate);
@@ -122,26 +125,25 @@ impl ContactStep<'_> {
                 return Ok(Decision::Again(next));
             }
         };
-        self.give_up(attempt, error, case)
+        self.give_up(attempt, failure, case)
     }
 
-    /// After the last attempt of a solver, which ended with an `error`: the first one of its rescuer, if another method may
-    /// succeed. Of the errors of both the first is reported, unless only the second states the limit by rounding.
+    /// After the last attempt of a solver: the first one of its rescuer, if another method may succeed. Of the errors of both the
+    /// first is reported, unless only the second states the limit by rounding.
     pub(super) fn give_up(
         &mut self,
         attempt: Attempt,
-        error: ContactError,
+        failure: Failure,
         case: &LoadCase,
     ) -> Result<Decision, PetscError> {
-        let (comm, next) = (self.problem.body.nodes.partition.comm(), attempt.solver + 1);
-        if next < self.solvers.len() && error.may_be_rescued(comm) {
+        let (comm, next) = (self.problem.body.comm(), attempt.solver + 1);
+        if next < self.solvers.len() && failure.0.may_be_rescued(comm) {
             let first = self.first_attempt(next, case)?;
-            return Ok(Decision::Again(Attempt { rescued: Some(error), ..first }));
+            return Ok(Decision::Again(Attempt { rescued: Some(failure), ..first }));
         }
-        let is_limited = |error: &ContactError| matches!(error, ContactError::Limited { .. });
         Ok(Decision::GiveUp(match attempt.rescued {
-            Some(first) if is_limited(&first) || !is_limited(&error) => first,
-            _ => error,
+            Some(first) if first.1.is_some() || failure.1.is_none() => first,
+            _ => failure,
         }))
     }
 
@@ -168,20 +170,11 @@ impl ContactStep<'_> {
         partition.max_norm(&difference) / partition.max_norm(u)
     }
 
-    /// Adds to an error the tolerance that double precision can reach, if this explains the error.
-    fn limited(&self, error: ContactError, candidate: &Candidate) -> ContactError {
+    /// The tolerance that double precision can reach, if it is above the required one and the residuals are within it.
+    fn attainable(&self, candidate: &Candidate) -> Option<f64> {
         let attainable = ROUNDED * self.rounding(candidate);
-        match attainable > self.problem.tolerance
-            && candidate.kkt.within(attainable)
-            && attainable < 1.0
-        {
-            true => ContactError::Limited {
-                source: Box::new(error),
-                attainable,
-                contrast: self.problem.contrast(),
-            },
-            false => error,
-        }
+        let is_limit = self.problem.tolerance < attainable && attainable < 1.0;
+        (is_limit && candidate.kkt.within(attainable)).then_some(attainable)
     }
 
     /// Is u exact for a stiffness whose entries are off by ε_machine? In addition, its residuals must be at most

@@ -43,7 +43,7 @@ impl ContactStep<'_> {
         c_prescribed: &[f64],
         bounds: &[Bound],
     ) -> Result<ContactReport, ContactError> {
-        let comm = self.problem.body.nodes.partition.comm();
+        let comm = self.problem.body.comm();
         let admits_zero = |bound: &Bound| bound.nearest(0.0) == 0.0;
         let overlaps = comm.any(!bounds.iter().all(admits_zero));
         let (load, force) =

@@ -5,23 +5,19 @@ use crate::{
     contact::{self, ContactPoint, least_motion},
     fem::RigidMotion,
     petsc::PetscError,
-    problem::LoadCase,
+    problem::{DiscreteProblem, LoadCase},
 };
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// The rigid motions that only contact constrains and no contact force above `level` times F resists.
-    fn unresisted(&self, contact: &[ContactPoint], level: f64, force: f64) -> Vec<DVector<f64>> {
-        let active = active_bounds(&self.problem.constraints, contact, level * force);
-        let comm = self.problem.body.nodes.partition.comm();
-        contact::unconstrained_motions(comm, &self.rigid, &active)
-    }
-
-    /// Contact forces below this fraction of F may be residuals and do not count. By Cauchy and Schwarz, a residual
-    /// τF works on a rigid motion like a force √N τF. At a lever of one mesh width, 1/√N of the body, this is a
-    /// force N τF.
-    fn uncertain(&self) -> f64 {
-        self.problem.body.nodes.partition.total() as f64 * self.problem.tolerance
+    /// The rigid motions that only contact constrains and no contact force resists. Forces below N τF may be residuals and do
+    /// not count: by Cauchy and Schwarz, a residual τF works on a rigid motion like a force √N τF. At a lever of one mesh
+    /// width, 1/√N of the body, this is a force N τF.
+    fn unresisted(&self, contact: &[ContactPoint], force: f64) -> Vec<DVector<f64>> {
+        let DiscreteProblem { body, constraints, tolerance, .. } = &**self.problem;
+        let uncertain = body.nodes.partition.total() as f64 * tolerance;
+        let active = active_bounds(constraints, contact, uncertain * force);
+        contact::unconstrained_motions(body.comm(), &self.rigid, &active)
     }
 
     /// A rigid motion that the active nodes leave unconstrained. `None` without load (`force` = 0).
@@ -30,14 +26,14 @@ impl ContactStep<'_> {
         contact: &[ContactPoint],
         force: f64,
     ) -> Option<RigidMotion> {
-        let motions = self.unresisted(contact, self.uncertain(), force);
+        let motions = self.unresisted(contact, force);
         let first = motions.first().filter(|_| force > 0.0)?;
         Some(self.problem.motions.combined(&self.problem.body, first))
     }
 
     /// The answer of minimum ∫|u|² among all that differ from the certified `candidate` by an unresisted motion; it
     /// does not depend on the solver. Its certificate fails if a neglected contact force counts or acts across an
-    /// opening gap. Then fewer forces are neglected, or `candidate` is returned. Collective.
+    /// opening gap. Then `candidate` is returned. Collective.
     pub(super) fn of_minimum_displacement(
         &self,
         next: &mut AcceptedState,
@@ -45,27 +41,24 @@ impl ContactStep<'_> {
         case: &LoadCase,
     ) -> Result<Candidate, PetscError> {
         let problem = self.problem;
-        let tolerance = candidate.kkt.worst().max(problem.tolerance);
-        for level in [self.uncertain(), problem.tolerance] {
-            let left = self.unresisted(&candidate.contact, level, candidate.force);
-            if left.is_empty() || candidate.force == 0.0 {
-                break;
-            }
-            let total = next.reference.total(candidate.u.clone());
-            let amplitudes = problem.motions.amplitudes(&problem.body, &total);
-            let (bounds, c) = self.at_bounds(&next.reference, case)?;
-            let (comm, motions) = (problem.body.nodes.partition.comm(), (&self.rigid, &left[..]));
-            let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
-                break;
-            };
-            let mut reference = next.reference.clone();
-            self.move_rigidly(&mut reference, &further);
-            let moved = self.certify(&reference, candidate.u.clone(), case);
-            if moved.kkt.within(tolerance) {
-                next.reference = reference;
-                return Ok(moved);
-            }
+        let left = self.unresisted(&candidate.contact, candidate.force);
+        if left.is_empty() || candidate.force == 0.0 {
+            return Ok(candidate);
         }
-        Ok(candidate)
+        let total = next.reference.total(candidate.u.clone());
+        let amplitudes = problem.motions.amplitudes(&problem.body, &total);
+        let (bounds, c) = self.at_bounds(&next.reference, case)?;
+        let (comm, motions) = (problem.body.comm(), (&self.rigid, &left[..]));
+        let Some(further) = least_motion(comm, motions, &amplitudes, &bounds, &c) else {
+            return Ok(candidate);
+        };
+        let mut reference = next.reference.clone();
+        self.move_rigidly(&mut reference, &further);
+        let moved = self.certify(&reference, candidate.u.clone(), case);
+        if !moved.kkt.within(candidate.kkt.worst().max(problem.tolerance)) {
+            return Ok(candidate);
+        }
+        next.reference = reference;
+        Ok(moved)
     }
 }

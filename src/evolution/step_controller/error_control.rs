@@ -6,7 +6,7 @@ use crate::{
     evolution::{DiscreteProblem, LoadCurve},
     fem::Body,
     maximum,
-    problem::NEGLIGIBLE_DAMAGE,
+    observe::NEGLIGIBLE_DAMAGE,
     scene::{APART, Stepping},
 };
 use nalgebra::DVector;
@@ -203,7 +203,7 @@ impl<'a> ErrorControl<'a> {
             max = maximum(max, value.abs());
             integral += area * value.abs();
         }
-        let comm = self.body.vertices.partition.comm();
+        let comm = self.body.comm();
         [comm.max(max), comm.total(integral) / self.body.area]
     }
 }

@@ -23,7 +23,7 @@ const BODY_FORCE_TIMES: usize = 4;
 const MAX_SAMPLES: usize = 500;
 
 #[derive(Debug)]
-pub(in crate::problem) struct SurfaceForce {
+pub(super) struct SurfaceForce {
     /// f_N, N/m².
     force: SurfaceLoad,
     /// Its edges in the undivided body: ends and middles, m. All ranks divide them in the same way.
@@ -35,11 +35,7 @@ pub(in crate::problem) struct SurfaceForce {
 }
 
 impl SurfaceForce {
-    pub(in crate::problem) fn new(
-        points: &[[f64; 2]],
-        edges: &[Edge],
-        force: &SurfaceLoad,
-    ) -> Self {
+    pub(super) fn new(points: &[[f64; 2]], edges: &[Edge], force: &SurfaceLoad) -> Self {
         let line = |edge: &Edge| [0.0, 0.5, 1.0].map(|s| edge.at(points, s));
         let lines = edges.iter().map(line).collect();
         let smooth = smooth_halves(edges, points);

@@ -51,11 +51,7 @@ pub(crate) fn near_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<bool>
 
 /// The vertices of smooth free boundaries at which, or within half of an edge of which, a surface load jumps; each with the
 /// largest jump (t_x, t_y, pressure), Pa. The sides of a support are left out: its reaction is not known.
-pub(in crate::problem) fn load_jumps(
-    scene: &Scene,
-    mesh: &Mesh,
-    lines: &Lines,
-) -> Vec<(usize, [f64; 3])> {
+pub(crate) fn load_jumps(scene: &Scene, mesh: &Mesh, lines: &Lines) -> Vec<(usize, [f64; 3])> {
     // Per edge its loads; `None` if it is supported.
     let mut edges = BTreeMap::<[usize; 2], Option<Vec<&SurfaceLoad>>>::new();
     for boundary in &scene.boundaries {

@@ -7,8 +7,8 @@ use signorini::{
     evolution::{Choices, ContactStep, Step},
     fem::{Body, Location},
     mesh::{self, Order, Refinement},
+    observe::ObservedProblem,
     petsc::{Session, stage_seconds},
-    problem::DiscreteProblem,
     scene::Scene,
 };
 use std::path::Path;
@@ -41,7 +41,7 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
     let scene = Scene::read(scene, overrides)?;
     let coarse = mesh::load(&scene.mesh.file, &scene.mesh.parameters, scene.order)?;
     let coarse = Refinement::start(coarse).mesh;
-    let problem = DiscreteProblem::new(scene.clone(), coarse.clone())?;
+    let problem = ObservedProblem::new(scene.clone(), coarse.clone())?;
     let mut most: Option<Step> = None;
     let mut observer = |step: &Step| {
         let of = |step: &Step| step.record.displacement_max;
@@ -69,13 +69,13 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
     }
     let mut fine = scene;
     fine.order = Order::Quadratic;
-    let fine = DiscreteProblem::new(fine, finer.mesh)?;
+    let fine = ObservedProblem::new(fine, finer.mesh)?;
     let choices = Choices::of(fine.scene());
     let seconds = stage_seconds();
     let exact = ContactStep::new(session, &fine, &choices)?.solve(0, state.time, &zeta)?;
     let own = interpolated(body, &state.u, &fine.body, &parents);
     let error: Vec<f64> = exact.state.u.iter().zip(&own).map(|(u, own)| u - own).collect();
-    let energy = |problem: &DiscreteProblem, zeta: &[f64], u: &[f64]| {
+    let energy = |problem: &ObservedProblem, zeta: &[f64], u: &[f64]| {
         let zeta = problem.zeta_at_points(zeta);
         problem.elasticity.energies(&problem.body, &zeta, u).iter().sum::<f64>()
     };

@@ -11,7 +11,7 @@ use crate::StudyError;
 use cases::Case;
 use signorini::{
     contact::SOLVERS,
-    evolution::{Accuracy, DiscreteProblem, Outcome, RunError},
+    evolution::{Accuracy, ObservedProblem, Outcome, RunError},
     petsc::Session,
 };
 use std::time::Instant;
@@ -51,7 +51,7 @@ pub(super) fn fill(session: &Session, table: &mut Table) -> Result<(), StudyErro
 fn attempt(
     session: &Session,
     case: &Case,
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     solver: &'static str,
 ) -> Result<Attempt, StudyError> {
     let started = Instant::now();

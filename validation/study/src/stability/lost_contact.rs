@@ -10,7 +10,7 @@ use super::{
 use crate::StudyError;
 use signorini::{
     contact::SOLVERS,
-    evolution::{ContactPoint, DiscreteProblem, SetupError, State, Step},
+    evolution::{ContactPoint, ObservedProblem, SetupError, State, Step},
     petsc::Session,
 };
 use sweeps::{CELLS, CLAMPED, SWEEPS, Sweep};
@@ -107,7 +107,7 @@ fn add(
 /// but one answer, by its note where there are many.
 fn classified(
     row: Row,
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     (sweep, value): (&Sweep, f64),
     Step { state, record, report, unconstrained, .. }: &Step,
     other: Option<&Vec<f64>>,
@@ -141,7 +141,7 @@ fn classified(
 
 /// The larger error of the balance of forces across the foundation and of moments, where the
 /// body may turn, relative to the size of the load.
-fn unbalanced(problem: &DiscreteProblem, state: &State) -> f64 {
+fn unbalanced(problem: &ObservedProblem, state: &State) -> f64 {
     let nodes = &problem.body.mesh.nodes;
     let load = problem.loads.at(&problem.body, state.time);
     let size: f64 = load.chunks(2).map(|f| f[0].hypot(f[1])).sum();

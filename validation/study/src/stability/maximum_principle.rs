@@ -8,7 +8,7 @@ use super::{
 use crate::StudyError;
 use signorini::{
     estimate::Simulation,
-    evolution::{DiscreteProblem, Step},
+    evolution::{ObservedProblem, Step},
     fem,
     mesh::Mesh,
     model::Fremond,
@@ -135,7 +135,7 @@ fn problem(
     diffusion: f64,
     step: f64,
     mass: &str,
-) -> Result<DiscreteProblem, StudyError> {
+) -> Result<ObservedProblem, StudyError> {
     let set = [
         format!("damage.diffusion={diffusion:e}"),
         format!("damage.mass={mass}"),
@@ -161,7 +161,7 @@ struct Seen {
 }
 
 impl Seen {
-    fn of(problem: &DiscreteProblem, history: &[Step], length: f64) -> Self {
+    fn of(problem: &ObservedProblem, history: &[Step], length: f64) -> Self {
         let mut seen = Self { rise: 0.0, undershoot: 0.0, least_admissible: 0.0 };
         let (mut least, mut most) = (f64::NEG_INFINITY, f64::INFINITY);
         for step in history {
@@ -179,7 +179,7 @@ impl Seen {
 }
 
 /// min φ at a state, 1/s.
-fn least_source(problem: &DiscreteProblem, step: &Step) -> f64 {
+fn least_source(problem: &ObservedProblem, step: &Step) -> f64 {
     let Some(laws) = problem.damage() else { return 0.0 };
     let strains = problem.body.strains(&step.state.u);
     let phi = fem::source(&problem.body, (&Fremond, laws), &strains, &step.state.zeta)

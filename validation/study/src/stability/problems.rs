@@ -3,7 +3,7 @@
 use crate::StudyError;
 use signorini::{
     estimate::Simulation,
-    evolution::{Choices, ContactStep, DiscreteProblem, Outcome, RunError, SetupError, Step},
+    evolution::{Choices, ContactStep, ObservedProblem, Outcome, RunError, SetupError, Step},
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -38,18 +38,18 @@ boundary = [
 ///
 /// # Errors
 /// The scene is wrong or does not fit the mesh.
-pub fn problem(mesh: Mesh, text: &str, set: &[String]) -> Result<DiscreteProblem, SetupError> {
+pub fn problem(mesh: Mesh, text: &str, set: &[String]) -> Result<ObservedProblem, SetupError> {
     let mut scene = Scene::parse(&format!("{HEAD}{text}"), Path::new("study.toml"), set)?;
     // The maps show where each solver fails by itself.
     scene.contact.rescue = false;
-    DiscreteProblem::new(scene, mesh)
+    ObservedProblem::new(scene, mesh)
 }
 
 /// As [`problem`], on the unit square in n × n cells.
 ///
 /// # Errors
 /// See [`problem`].
-pub fn square(n: usize, text: &str, set: &[String]) -> Result<DiscreteProblem, SetupError> {
+pub fn square(n: usize, text: &str, set: &[String]) -> Result<ObservedProblem, SetupError> {
     problem(Mesh::rectangle(1.0, 1.0, n, n), text, set)
 }
 
@@ -59,7 +59,7 @@ pub fn square(n: usize, text: &str, set: &[String]) -> Result<DiscreteProblem, S
 /// See [`RunError`].
 pub fn run(
     session: &Session,
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     solver: &str,
 ) -> Result<Outcome, RunError> {
     Simulation::new(problem).solver_named(solver).run(session)
@@ -72,11 +72,12 @@ pub fn run(
 /// What no contact solver is to blame for.
 pub fn solve(
     session: &Session,
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     solver: &str,
     guess: Option<&[f64]>,
 ) -> Result<Result<Step, RunError>, StudyError> {
-    let mut contact_step = ContactStep::new(session, problem, &Choices::named(solver))?;
+    let mut contact_step =
+        ContactStep::new(session, problem, &Choices::of(problem.scene()).solver_named(solver))?;
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }

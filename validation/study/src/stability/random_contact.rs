@@ -10,7 +10,7 @@ use rand_xoshiro::{
     SplitMix64,
     rand_core::{Rng, SeedableRng},
 };
-use signorini::{evolution::DiscreteProblem, petsc::Session};
+use signorini::{evolution::ObservedProblem, petsc::Session};
 
 /// Problems of the map.
 const PROBLEMS: u64 = 1_000;
@@ -47,7 +47,7 @@ impl Random {
 struct Problem {
     kind: &'static str,
     contrast: f64,
-    discrete: DiscreteProblem,
+    discrete: ObservedProblem,
     /// A random first guess of the active nodes, for every other problem.
     guess: Option<Vec<f64>>,
 }

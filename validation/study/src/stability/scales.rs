@@ -8,7 +8,7 @@ use super::{
 use crate::StudyError;
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, RunError, SetupError, State},
+    evolution::{ObservedProblem, RunError, SetupError, State},
     mesh::Mesh,
     petsc::Session,
 };
@@ -102,7 +102,7 @@ fn scene(
     stress: f64,
     length: f64,
     gap: f64,
-) -> Result<DiscreteProblem, SetupError> {
+) -> Result<ObservedProblem, SetupError> {
     let (young, pressure, gap) = (100.0 * stress, 0.02 * stress, gap * length);
     let (factor, time) = match kind {
         "swinging" => ("*sin(2*pi*t)", "time = { end = 0.75, step = 0.125 }"),
@@ -124,7 +124,7 @@ boundary = [
 /// The last state and the worst residual.
 fn last(
     session: &Session,
-    problem: &DiscreteProblem,
+    problem: &ObservedProblem,
     solver: &str,
 ) -> Result<(State, f64), StudyError> {
     if problem.scene().time.is_none() {

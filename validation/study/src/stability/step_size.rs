@@ -8,7 +8,7 @@ use super::{
 use crate::StudyError;
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, SetupError},
+    evolution::{ObservedProblem, SetupError},
     petsc::Session,
 };
 use std::time::Instant;
@@ -42,7 +42,7 @@ pub(super) fn fill(session: &Session, table: &mut Table) -> Result<(), StudyErro
 }
 
 /// Example I on n × n cells.
-fn example_i(n: usize, set: &[String]) -> Result<DiscreteProblem, SetupError> {
+fn example_i(n: usize, set: &[String]) -> Result<ObservedProblem, SetupError> {
     square(n, &format!("{DAMAGE}{EXAMPLE_I}"), set)
 }
 

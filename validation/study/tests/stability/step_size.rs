@@ -2,7 +2,7 @@
 
 use signorini::{
     contact::SOLVERS,
-    evolution::{DiscreteProblem, Outcome},
+    evolution::{ObservedProblem, Outcome},
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -16,7 +16,7 @@ fn run(set: &[&str]) -> Outcome {
     let set: Vec<String> = set.iter().map(|key| (*key).to_owned()).collect();
     let text = include_str!("../../../../geo/square.toml");
     let scene = Scene::parse(text, Path::new("square.toml"), &set).unwrap();
-    let problem = DiscreteProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8)).unwrap();
+    let problem = ObservedProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8)).unwrap();
     problems::run(&session, &problem, SOLVERS[0]).unwrap()
 }
 

@@ -3,7 +3,7 @@
 use super::super::problems::{self, PRESSED_AND_LIFTED};
 use crate::StudyError;
 use signorini::{
-    evolution::{DiscreteProblem, Outcome},
+    evolution::{ObservedProblem, Outcome},
     mesh::Mesh,
 };
 use std::f64::consts::PI;
@@ -82,7 +82,7 @@ impl Case {
     }
 
     /// The case as the program sees it.
-    pub fn problem(&self, tolerance: f64) -> Result<DiscreteProblem, StudyError> {
+    pub fn problem(&self, tolerance: f64) -> Result<ObservedProblem, StudyError> {
         let (poisson, plane) = self.material;
         let set = [
             format!("material.poisson={poisson}"),
@@ -97,7 +97,7 @@ impl Case {
 impl Exact {
     /// max |u_y − exact| over the gap of a beam; of a curl ‖u − exact‖ at the nodes over that
     /// of the curl.
-    pub fn error(&self, problem: &DiscreteProblem, outcome: &Outcome) -> f64 {
+    pub fn error(&self, problem: &ObservedProblem, outcome: &Outcome) -> f64 {
         let nodes = problem.body.mesh.nodes.iter().zip(outcome.last.state.u.chunks(2));
         match *self {
             Self::Beam { span, gap, load } => {

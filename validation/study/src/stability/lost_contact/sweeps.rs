@@ -1,7 +1,7 @@
 //! The bodies of the map, and what changes along each of its rows.
 
 use super::super::problems::square;
-use signorini::evolution::{DiscreteProblem, SetupError};
+use signorini::evolution::{ObservedProblem, SetupError};
 
 /// A unit square; BOUNDARY and LOAD are filled in.
 const SCENE: &str = r#"
@@ -114,7 +114,7 @@ pub(super) const SWEEPS: [Sweep; 7] = [
 ];
 
 impl Sweep {
-    pub(super) fn problem(&self, load: &str, contact: bool) -> Result<DiscreteProblem, SetupError> {
+    pub(super) fn problem(&self, load: &str, contact: bool) -> Result<ObservedProblem, SetupError> {
         let text = SCENE
             .replace("WEIGHT", &self.weight.to_string())
             .replace("SIDE", self.side)

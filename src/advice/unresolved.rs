@@ -1,15 +1,15 @@
 //! Data that the nodes do not resolve. Prescribed displacements and the initial damage enter by their values at
 //! nodes, and may vary more between them.
 
-use super::{
-    DiscreteProblem, State,
-    loads::{DEVIATION, NOTED, SAMPLE_TIMES, centroid, edge_parts, triangle_parts, triangle_point},
-};
 use crate::{
     ROUNDING,
     fem::{DamageSystem, GAUSS, POINTS, parabola, part_point, six_points},
     mesh::{Mesh, Order, distance, longest_side, midpoint, sorted},
     petsc::{PetscError, Session},
+    problem::{
+        DEVIATION, DiscreteProblem, NOTED, SAMPLE_TIMES, State, centroid, edge_parts,
+        triangle_parts, triangle_point,
+    },
     scene::{Condition, Expression, Scene},
 };
 use std::{
@@ -60,7 +60,7 @@ pub(crate) fn unresolved(
         let weighted = state.zeta.iter().zip(&problem.body.vertices.weights);
         let own = weighted.take(problem.body.vertices.partition.owned());
         let damage = own.map(|(zeta, weight)| weight * (1.0 - zeta).powi(2)).sum();
-        let damage = problem.body.vertices.partition.comm().total(damage);
+        let damage = problem.body.comm().total(damage);
         let allowed = (INTERPOLATION_SHARE * accuracy).powi(2) * damage / part;
         let mut largest: Vec<_> = missed.squares.iter().copied().enumerate().collect();
         largest.sort_by(|(_, a), (_, b)| b.total_cmp(a));

@@ -11,7 +11,8 @@ pub(crate) use observation::{Observation, greatest};
 pub use scales::Bar;
 pub(crate) use scales::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO};
 
-use crate::scene::Units;
+use super::Supports;
+use crate::{problem::DiscreteProblem, scene::Units};
 use serde::{Deserialize, Serialize};
 use std::{fmt, iter, ops::Index, slice};
 
@@ -152,24 +153,14 @@ impl Figure {
     }
 }
 
-/// The parts of a scene that have figures of their own, by their names.
-#[derive(Default)]
-pub(crate) struct Parts<'a> {
-    /// The materials, if there are several.
-    pub materials: Vec<&'a str>,
-    /// The boundaries with a table.
-    pub boundaries: Vec<PartOfBoundary<'a>>,
-    pub probes: Vec<&'a str>,
-}
-
 /// A boundary with a table.
-pub(crate) struct PartOfBoundary<'a> {
-    pub name: &'a str,
+struct PartOfBoundary<'a> {
+    name: &'a str,
     /// Its number among the supports, and among the foundations.
-    pub support: Option<usize>,
-    pub foundation: Option<usize>,
+    support: Option<usize>,
+    foundation: Option<usize>,
     /// Does its foundation move?
-    pub moves: bool,
+    moves: bool,
 }
 
 /// The figures of a problem.
@@ -190,8 +181,24 @@ pub fn in_words(material: &str) -> &str {
 }
 
 impl Figures {
-    /// The list of all figures.
-    pub(crate) fn new(parts: &Parts) -> Self {
+    /// The list of all figures of a problem with these supports.
+    pub(super) fn of(problem: &DiscreteProblem, supports: &Supports) -> Self {
+        let several = if problem.materials.len() > 1 { &problem.materials[..] } else { &[] };
+        let number = |names: &[String], of: &str| names.iter().position(|name| name == of);
+        let boundaries = problem.scene().boundaries.iter().map(|of| PartOfBoundary {
+            name: &of.name,
+            support: number(&supports.names, &of.name),
+            foundation: number(&problem.foundations, &of.name),
+            moves: of.gap().is_some_and(|gap| gap.distance.depends_on_time()),
+        });
+        let materials = several.iter().map(|(_, name)| name.as_str());
+        let probes = problem.scene().probes.iter().map(|probe| probe.name.as_str());
+        Self::new(&Vec::from_iter(materials), &Vec::from_iter(boundaries), &Vec::from_iter(probes))
+    }
+
+    /// The list of all figures: of the body, of these `materials` if there are several, of the `boundaries` with a table and of the
+    /// `probes`.
+    fn new(materials: &[&str], boundaries: &[PartOfBoundary], probes: &[&str]) -> Self {
         use Dimension::{
             ContactLength, Force, Given, Length, Moment, OfZeta, Place, Stress, Work, Zeta,
         };
@@ -208,7 +215,7 @@ impl Figures {
             ("principal_max", "largest σ₁@", Stress, Largest),
             ("principal_min", "smallest σ₂@", Stress, Least),
         ];
-        let materials = parts.materials.iter().map(|name| Of::Material((*name).to_owned()));
+        let materials = materials.iter().map(|name| Of::Material((*name).to_owned()));
         for (i, of) in iter::once(Of::Body).chain(materials).enumerate() {
             all.add(&of, stresses, move |of, k| of.stresses[i][k]);
         }
@@ -216,12 +223,12 @@ impl Figures {
             ("pressure_max", "largest contact pressure@", Stress, Largest),
             ("contact_length", "length of contact@", ContactLength, Largest),
         ];
-        if parts.boundaries.iter().any(|of| of.foundation.is_some()) {
+        if boundaries.iter().any(|of| of.foundation.is_some()) {
             let force = ("contact_force", "sum of contact reactions", Force, Largest);
             all.add(&body, [force], |of, _| of.contact_force.into());
             all.add(&body, contact, |of, k| of.contact[0].values[k]);
         }
-        for (i, boundary) in parts.boundaries.iter().enumerate() {
+        for (i, boundary) in boundaries.iter().enumerate() {
             let of = Of::Boundary(boundary.name.to_owned());
             if let Some(support) = boundary.support {
                 let resultants = [
@@ -236,12 +243,12 @@ impl Figures {
                 ("u_y", "mean displacement@, y", Length, LargestModulus),
             ];
             // A probe of the same name has these figures.
-            if !parts.probes.contains(&boundary.name) {
-                all.add(&of, means, move |of, k| of.means[i].displacement[k].into());
+            if !probes.contains(&boundary.name) {
+                all.add(&of, means, move |of, k| of.means[i][k].into());
             }
             if boundary.moves {
                 let travel = ("travel", "travel of the foundation@", Given, LargestModulus);
-                all.add(&of, [travel], move |of, _| of.means[i].travel.into());
+                all.add(&of, [travel], move |of, _| of.means[i][2].into());
             }
             if let Some(foundation) = boundary.foundation {
                 all.add(&of, contact, move |of, k| of.contact[1 + foundation].values[k]);
@@ -260,7 +267,7 @@ impl Figures {
                 all.add(&of, places, move |of, k| value(of, k).into());
             }
         }
-        for (i, name) in parts.probes.iter().enumerate() {
+        for (i, name) in probes.iter().enumerate() {
             let observed = [
                 ("u_x", "displacement@, x", Length, LargestModulus),
                 ("u_y", "displacement@, y", Length, LargestModulus),
@@ -280,11 +287,7 @@ impl Figures {
     pub fn of_any_scene() -> Self {
         let [support, foundation] = [Some(0); 2];
         let boundary = PartOfBoundary { name: "BOUNDARY", support, foundation, moves: true };
-        Self::new(&Parts {
-            materials: vec!["MATERIAL"],
-            boundaries: vec![boundary],
-            probes: vec!["PROBE"],
-        })
+        Self::new(&["MATERIAL"], &[boundary], &["PROBE"])
     }
 
     /// Adds several figures of one part. Each has a kind, a label in which @ stands for the name of the part, a dimension, and which

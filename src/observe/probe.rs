@@ -1,8 +1,8 @@
 //! Points of the body at which every step reports displacement, damage and stress.
 
-use super::{DiscreteProblem, SetupError, State};
 use crate::{
     fem::{Body, Location, Subdomain},
+    problem::{DiscreteProblem, SetupError, State},
     scene::Scene,
 };
 use nalgebra::Vector3;

@@ -1,15 +1,15 @@
 //! Stresses at the nodes, as engineers look at them: continuous within a material.
 
-use super::{DiscreteProblem, State, Value, figures::greatest};
+use super::{ObservedProblem, Value, figures::greatest};
 use crate::{
-    ROUNDING,
-    fem::{Fits, Partition, Patches, RigidMotion, for_elements},
+    fem::{Fits, Partition, Patches, for_elements},
     model::{Material, von_mises},
     petsc::PetscError,
+    problem::{DiscreteProblem, State},
 };
 use nalgebra::{Matrix3, Vector3};
 use rustc_hash::FxHashMap as HashMap;
-use std::{borrow::Cow, sync::Arc};
+use std::sync::Arc;
 
 /// σ = η_*(ζ) 𝒜ε* at the nodes of this rank, with the recovered strains ε*
 /// ([`RecoveredStrains`](crate::estimate::RecoveredStrains)).
@@ -125,20 +125,10 @@ impl NodalStress {
     }
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The nodes of the body as points of stresses. Collective.
     pub fn nodal_stress(&self) -> &Arc<NodalStress> {
         self.nodal_stress.get_or_init(|| NodalStress::new(self).into())
-    }
-
-    /// `state`, without displacements if the body only moves rigidly: its strains are rounding. Collective.
-    pub(crate) fn strained<'a>(&self, state: &'a State) -> Cow<'a, State> {
-        let motion = RigidMotion::nearest(&self.body, &state.u);
-        let [rigid, rest] = motion.max_norms(&self.body, &state.u);
-        match rest > ROUNDING * rigid {
-            true => Cow::Borrowed(state),
-            false => Cow::Owned(State { u: vec![0.0; state.u.len()], ..state.clone() }),
-        }
     }
 
     /// The largest von Mises stress and σ₁, and the smallest σ₂, Pa, of the body and of each of several materials. Collective.
@@ -159,7 +149,7 @@ impl DiscreteProblem {
                 }
             }
         }
-        let comm = body.nodes.partition.comm();
+        let comm = body.comm();
         let extremes = |parts: &[[(f64, [f64; 2]); 3]]| {
             let [von_mises, most, least] =
                 [0, 1, 2].map(|k| greatest(comm, parts.iter().map(|part| part[k])));

@@ -4,10 +4,11 @@
 //!
 //! if the gap is narrower or more curved than an edge can resolve.
 
-use super::{DiscreteProblem, NOTED, State, rows_of};
 use crate::{
     fem::{Edge, parabola},
     mesh::{bounds, sorted},
+    observe::{ObservedProblem, rows_of},
+    problem::{NOTED, State},
     scene::Gap,
 };
 
@@ -29,7 +30,7 @@ pub(crate) struct Penetration {
     boundary: usize,
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The penetrations of the foundation between the nodes of Γ_C, in a state. Collective.
     pub(crate) fn penetrations(&self, state: &State) -> Vec<Penetration> {
         let (body, node, mut own) = (&self.body, self.body.node_of_vertex(), Vec::new());
@@ -50,7 +51,7 @@ impl DiscreteProblem {
                 }
             }
         }
-        let all = self.body.nodes.partition.comm().gather(own.as_flattened());
+        let all = self.body.comm().gather(own.as_flattened());
         let penetration = |&[triangle, depth, x, y, boundary]: &[f64; 5]| Penetration {
             triangle: triangle as usize,
             depth,

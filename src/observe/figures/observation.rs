@@ -2,11 +2,9 @@
 
 use super::{SHOWN_AS_ZERO, Value};
 use crate::{
+    observe::{ContactFigures, ContactRow, NodalStress, ObservedProblem, Strained, rows_of},
     petsc::{Communicator, PetscError},
-    problem::{
-        ContactFigures, ContactRow, DiscreteProblem, MeanDisplacement, NodalStress, State,
-        Strained, rows_of,
-    },
+    problem::State,
 };
 
 /// The quantities from which figures take their values. All are sums or extremes over the
@@ -31,13 +29,13 @@ pub(crate) struct Observation {
     pub contact: Vec<ContactFigures>,
     /// Per support: F_x, F_y, N per metre of thickness, and the moment about the origin, N.
     pub resultants: Vec<[f64; 3]>,
-    /// Per boundary with a table.
-    pub means: Vec<MeanDisplacement>,
+    /// Per boundary with a table: its mean displacement, and the travel of its foundation, m.
+    pub means: Vec<[f64; 3]>,
     /// Per probe: u_x, u_y, m, ζ, σ_xx, σ_yy, σ_xy and the von Mises stress, Pa.
     pub probes: Vec<[f64; 7]>,
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The observation of a state with the nodal loads `load` and the residual forces `unbalanced` = f − Ku, and its figures.
     /// Forces up to `rounding`, N per metre of thickness, are zero. Collective.
     ///
@@ -63,7 +61,7 @@ impl Observation {
     /// # Errors
     /// PETSc failed.
     pub(crate) fn new(
-        problem: &DiscreteProblem,
+        problem: &ObservedProblem,
         state: &State,
         load: &[f64],
         unbalanced: &[f64],

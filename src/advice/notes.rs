@@ -1,9 +1,10 @@
 //! Notes for the user on a problem, before any solve.
 
-use super::{DiscreteProblem, LoadCurve, SAMPLE_TIMES, unresolved};
+use super::unresolved;
 use crate::{
     mesh::{Order, extent},
     model::Plane,
+    problem::{DiscreteProblem, LoadCurve, SAMPLE_TIMES},
     scene::{Boundary, Gap, Scene},
 };
 use std::iter::once;

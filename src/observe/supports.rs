@@ -1,12 +1,13 @@
 //! The boundaries that support the body and the forces they exert.
 
-use super::{ContactLine, DiscreteProblem, State, boundary_conditions::BoundaryConditions};
+use super::{ContactLine, ObservedProblem};
 use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge, Subdomain},
     mesh::{BoundaryFace, Lines, extent, sorted},
-    scene::{Boundary, Scene, SurfaceLoad},
+    problem::{DiscreteProblem, State},
+    scene::{Boundary, SurfaceLoad},
 };
 use nalgebra::{Matrix2, Vector2, Vector3};
 use std::{
@@ -44,16 +45,14 @@ struct NodeEdge {
 }
 
 impl Supports {
-    /// The supports of `scene` on the undivided `body`, with its `conditions` and the lines of its boundary.
-    pub(super) fn new(
-        scene: &Scene,
-        body: &Body,
-        conditions: &BoundaryConditions,
-        lines: &Lines,
-    ) -> Self {
+    /// The supports of an undivided problem, with the lines of its boundary.
+    pub(super) fn new(problem: &DiscreteProblem, lines: &Lines) -> Self {
+        let (scene, body) = (problem.scene(), &problem.body);
         let closed = ROUNDING * extent(&body.nodes.points);
-        let mut supports = Self { names: conditions.supports.clone(), closed, ..Self::default() };
-        for (row, boundary) in conditions.rows.iter().zip(&conditions.prescribed_by) {
+        let names = scene.boundaries.iter().filter(|of| of.is_support());
+        let names = names.map(|of| of.name.clone()).collect();
+        let mut supports = Self { names, closed, ..Self::default() };
+        for (boundary, row) in &problem.prescribed {
             supports.prescribed.entry(row.node).or_default().push((*boundary, row.direction));
         }
         let contact = scene.boundaries.iter().filter_map(|boundary @ Boundary { name, .. }| {
@@ -119,37 +118,6 @@ impl Supports {
             contact: self.contact.restrict(own),
             closed: self.closed,
         }
-    }
-
-    /// The nodes of Γ_C with a prescribed normal displacement, with the part of their reactions that Γ_C exerts. It presses
-    /// where its gap is closed, and this part is more than `rounding`, N per metre of thickness.
-    fn pressed(
-        &self,
-        body: &Body,
-        state: &State,
-        (unbalanced, rounding): (&[f64], f64),
-        stress: impl Fn(usize, [f64; 3]) -> Vector3<f64>,
-    ) -> Vec<ContactPoint> {
-        let pressed = |point: &ContactPoint| {
-            let shares = self.contact.shares(point, state.time);
-            let bears = shares.iter().find(|share| share.force > 0.0)?;
-            let number = self.contact.line_nodes[bears.line_node].boundary;
-            let gap = [(number, point.normal)];
-            let directions = [self.prescribed.get(&point.node)?, &gap[..]].concat();
-            let at = (point.node, body.nodes.points[point.node], state.time);
-            let reaction =
-                -Vector2::new(unbalanced[2 * point.node], unbalanced[2 * point.node + 1]);
-            let exerted = self.divided(at, reaction, &directions, &stress);
-            let own = exerted.iter().filter(|(other, _)| *other == number);
-            let normal = Vector2::from(point.normal);
-            let force: f64 = own.map(|(_, force)| -force.dot(&normal)).sum();
-            let edges = self.edges.get(&point.node)?.iter().filter(|of| of.boundary == number);
-            let length: f64 = edges.map(|edge| edge.face.length).sum();
-            let active = point.gap <= self.closed && force > rounding;
-            let [force, pressure] = if active { [force, force / length] } else { [0.0; 2] };
-            Some(ContactPoint { force, pressure, active, ..*point })
-        };
-        state.prescribed.iter().map(|point| pressed(point).unwrap_or(*point)).collect()
     }
 
     /// Per boundary: (F_x, F_y, M), this rank's part, with F = Σ R_i, N per metre of thickness, and M = Σ x_i × R_i
@@ -244,19 +212,43 @@ impl Supports {
     }
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// σ of a state in a triangle at barycentric coordinates, Pa.
     pub(super) fn stress_in(&self, state: &State) -> impl Fn(usize, [f64; 3]) -> Vector3<f64> {
         let zeta = LazyCell::new(|| self.zeta_at_points(&state.zeta));
         move |t, at| self.elasticity.stress_at(&self.body, (t, at), &zeta, &state.u)
     }
 
-    /// Sets the forces of Γ_C at the nodes of a state with a prescribed normal displacement. `unbalanced` is f − Ku. Forces up
-    /// to `rounding`, N per metre of thickness, are zero.
-    pub(crate) fn share_reactions(&self, state: &mut State, unbalanced: &[f64], rounding: f64) {
-        let (body, reactions) = (&self.body, (unbalanced, rounding));
-        let pressed = self.supports.pressed(body, state, reactions, self.stress_in(state));
-        state.prescribed = pressed;
+    /// The nodes of Γ_C with a prescribed normal displacement, with the part of their reactions that Γ_C exerts. It presses
+    /// where its gap is closed, and this part is more than `rounding`, N per metre of thickness.
+    /// `unbalanced` is f − Ku.
+    pub(crate) fn pressed(
+        &self,
+        state: &State,
+        unbalanced: &[f64],
+        rounding: f64,
+    ) -> Vec<ContactPoint> {
+        let (supports, stress) = (&self.supports, self.stress_in(state));
+        let pressed = |point: &ContactPoint| {
+            let shares = supports.contact.shares(point, state.time);
+            let bears = shares.iter().find(|share| share.force > 0.0)?;
+            let number = supports.contact.line_nodes[bears.line_node].boundary;
+            let gap = [(number, point.normal)];
+            let directions = [supports.prescribed.get(&point.node)?, &gap[..]].concat();
+            let at = (point.node, self.body.nodes.points[point.node], state.time);
+            let reaction =
+                -Vector2::new(unbalanced[2 * point.node], unbalanced[2 * point.node + 1]);
+            let exerted = supports.divided(at, reaction, &directions, &stress);
+            let own = exerted.iter().filter(|(other, _)| *other == number);
+            let normal = Vector2::from(point.normal);
+            let force: f64 = own.map(|(_, force)| -force.dot(&normal)).sum();
+            let edges = supports.edges.get(&point.node)?.iter().filter(|of| of.boundary == number);
+            let length: f64 = edges.map(|edge| edge.face.length).sum();
+            let active = point.gap <= supports.closed && force > rounding;
+            let [force, pressure] = if active { [force, force / length] } else { [0.0; 2] };
+            Some(ContactPoint { force, pressure, active, ..*point })
+        };
+        state.prescribed.iter().map(|point| pressed(point).unwrap_or(*point)).collect()
     }
 }
 

@@ -8,12 +8,9 @@
 //! z is continuous at interfaces. Sectors with the angles α₁, α₂, … transfer it by T = … exp(α₂A₂) exp(α₁A₁). The sides
 //! have conditions B z = 0 and C z = 0, so that det(B; CT) = 0. Inside the body z returns to itself: det(T − I) = 0.
 
-use super::{
-    DiscreteProblem,
-    loads::{jump, load_jumps},
-};
 use crate::{
     mesh::Lines,
+    problem::{DiscreteProblem, jump, load_jumps},
     scene::{Boundary, Condition},
 };
 use nalgebra::{Complex, Matrix2x4, Matrix3, Matrix4};

@@ -17,12 +17,12 @@
 //! the length there, the reaction F = (λ_a + λ_b) p becomes the pressures p_a = p − J λ_b/(λ_a + λ_b) and p_b = p_a + J. The
 //! jump J is the difference of the pressures that the next two line nodes of each side extrapolate.
 
-use super::State;
 use crate::{
     ROUNDING,
     contact::ContactPoint,
     fem::{Body, Edge},
     mesh::{BoundaryFace, Lines, distance, joined_faces},
+    problem::State,
     scene::{Expression, Gap},
 };
 use serde::Serialize;
@@ -242,7 +242,7 @@ impl ContactLine {
             self.shares(point, state.time).into_iter().map(of)
         };
         let own: Vec<Reaction> = state.of_contact().flat_map(reactions).collect();
-        let all = body.nodes.partition.comm().gather(own.as_flattened());
+        let all = body.comm().gather(own.as_flattened());
         let mut all: Vec<Reaction> = all.as_chunks().0.to_vec();
         all.sort_by(|a, b| a[0].total_cmp(&b[0]));
         all
@@ -290,7 +290,7 @@ impl ContactLine {
             let ContactRow { x, y, .. } = line_nodes[0].row;
             (line_nodes.map(|of| of.boundary), [x, y], [nx, ny])
         };
-        let is_first = body.nodes.partition.comm().rank() == 0;
+        let is_first = body.comm().rank() == 0;
         self.moved(&all).map(of).filter(|_| is_first).collect()
     }
 

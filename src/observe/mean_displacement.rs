@@ -1,9 +1,10 @@
 //! The mean displacement of each boundary with a table, and the travel of its foundation.
 
-use super::{DiscreteProblem, State};
+use super::ObservedProblem;
 use crate::{
     fem::{Body, Subdomain},
     mesh::Lines,
+    problem::State,
     scene::Scene,
 };
 use std::collections::BTreeMap;
@@ -11,15 +12,6 @@ use std::collections::BTreeMap;
 /// Per boundary with a table: its nodes on this rank, with their tributary lengths ∫φ_i, m.
 #[derive(Debug)]
 pub(super) struct Means(Vec<BTreeMap<usize, f64>>);
-
-/// The motion of a boundary and of its foundation.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct MeanDisplacement {
-    /// ∫u/|Γ| of the boundary Γ, m.
-    pub displacement: [f64; 2],
-    /// ∫(g(x, 0) − g(x, t))/|Γ|: how far the foundation has moved towards the body, m; 0 without one.
-    pub travel: f64,
-}
 
 impl Means {
     pub(super) fn new(scene: &Scene, body: &Body, lines: &Lines) -> Self {
@@ -41,27 +33,25 @@ impl Means {
     }
 }
 
-impl DiscreteProblem {
-    /// The mean displacements of the boundaries with a table. Collective.
-    pub(super) fn mean_displacements(&self, state: &State) -> Vec<MeanDisplacement> {
+impl ObservedProblem {
+    /// Per boundary Γ with a table: ∫u/|Γ|, and ∫(g(x, 0) − g(x, t))/|Γ|, how far the foundation has moved towards the body; 0
+    /// without one, m. Collective.
+    pub(super) fn mean_displacements(&self, state: &State) -> Vec<[f64; 3]> {
         let mut sums = vec![[0.0; 4]; self.means.0.len()];
         for ((lengths, boundary), sums) in
-            self.means.0.iter().zip(&self.scene.boundaries).zip(&mut sums)
+            self.means.0.iter().zip(&self.scene().boundaries).zip(&mut sums)
         {
             let gap = boundary.gap().filter(|gap| gap.distance.depends_on_time());
             for (&node, length) in lengths {
                 let [x, y] = self.body.nodes.points[node];
                 let gap = |t: f64| gap.map_or(0.0, |gap| gap.distance.eval(x, y, t));
-                let travel = gap(self.scene.start()) - gap(state.time);
+                let travel = gap(self.scene().start()) - gap(state.time);
                 let values = [state.u[2 * node], state.u[2 * node + 1], travel, 1.0];
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += length * value);
             }
         }
-        self.body.nodes.partition.comm().sum(sums.as_flattened_mut());
-        let mean = |[x, y, travel, length]: [f64; 4]| MeanDisplacement {
-            displacement: [x / length, y / length],
-            travel: travel / length,
-        };
+        self.body.comm().sum(sums.as_flattened_mut());
+        let mean = |[x, y, travel, length]: [f64; 4]| [x, y, travel].map(|sum| sum / length);
         sums.into_iter().map(mean).collect()
     }
 }

@@ -1,7 +1,7 @@
 //! The scales of figures: of relative errors, and of rounding.
 
 use super::{Dimension, Figure, Figures, Governing, Value};
-use crate::problem::DiscreteProblem;
+use crate::observe::ObservedProblem;
 use serde::{Deserialize, Serialize};
 
 /// A damage below this is negligible.
@@ -35,7 +35,7 @@ impl Bar {
     }
 }
 
-impl DiscreteProblem {
+impl ObservedProblem {
     /// The extreme of the part in which the extreme `number` lies; itself if it has no parts.
     pub(crate) fn part_of(&self, number: usize, values: &[Value]) -> usize {
         let size = |k: &usize| self.figures[*k].size(values[*k].value);

@@ -1,0 +1,20 @@
+//! Advice to the user: notes on a problem, singular points, and data that the mesh does not resolve.
+//!
+//! - [`DiscreteProblem::notes`](crate::problem::DiscreteProblem::notes): the notes before any solve;
+//! - [`Singular`]: points at which stresses grow with every finer mesh; peaks of the pressure that the mesh does not resolve;
+//! - `unresolved`: edges that must be halved to resolve prescribed displacements and the initial damage;
+//! - `Penetration`: where the body penetrates a foundation between the nodes.
+//!
+//! What crosses the door: `accuracy` marks the mesh at these points, and `command` prints the notes. Nothing here changes an answer.
+
+mod collapse;
+mod notes;
+mod peaks;
+mod penetration;
+mod singular;
+mod unresolved;
+
+pub use notes::locks;
+pub(crate) use singular::SEEN;
+pub use singular::Singular;
+pub(crate) use unresolved::unresolved;
