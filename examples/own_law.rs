@@ -7,7 +7,7 @@
 use signorini::{
     accuracy::adapted,
     estimate::Simulation,
-    evolution::Choices,
+    evolution::RunOptions,
     mesh::Mesh,
     model::{DamagePoint, DamageSource},
     nalgebra::{Matrix2, Vector3},
@@ -62,10 +62,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         assert!((own - expected).abs() < 1e-12);
     }
     let scene = block("5 - 10*x")?;
-    let choices = Choices::of(&scene).law(Box::new(TensionOnly));
-    let adapted = adapted(&session, &scene, mesh, &choices, 0.05, &mut |_| {})?;
+    let run_options = RunOptions::of(&scene).law(Box::new(TensionOnly));
+    let adapted = adapted(&session, &scene, mesh, &run_options, 0.05, &mut |_| {})?;
     let problem = ObservedProblem::new(scene, adapted.mesh)?;
-    let mut outcome = Simulation::new(&problem).choices(&choices).run(&session)?;
+    let mut outcome = Simulation::new(&problem).run_options(&run_options).run(&session)?;
     outcome.set_bars(&problem, &adapted.measured)?;
     for (figure, value) in problem.figures.iter().zip(&outcome.last.figures) {
         if let Some(bar) = outcome.bars.iter().find(|bar| bar.name == figure.name) {

@@ -3,7 +3,7 @@
 use super::Extremes;
 use crate::{
     estimate::{RecoveredStrains, UNLOADED, at_vertices},
-    evolution::{Choices, Outcome, RunError, Step, all_steps},
+    evolution::{Outcome, RunError, RunOptions, Step, all_steps},
     mesh::Mesh,
     observe::ObservedProblem,
     petsc::{PetscError, Session},
@@ -56,13 +56,13 @@ impl<'a> FewStepRun<'a> {
     pub(super) fn run(
         session: &Session,
         problem: &'a ObservedProblem,
-        choices: &Choices,
+        run_options: &RunOptions,
         instants: usize,
         followed: &[f64],
     ) -> Result<Self, RunError> {
         let mut history = History::new(instants, problem.mesh().triangles.len());
         let mut observe = |step: &Step| Ok(history.observe(problem, step)?);
-        let run = all_steps(session, problem, choices, &mut observe, None, followed)?;
+        let run = all_steps(session, problem, run_options, &mut observe, None, followed)?;
         let outcome = run.outcome;
         if history.last != Some(outcome.last.state.time) {
             history.estimate(problem, &outcome.last.state)?;
@@ -88,10 +88,10 @@ impl<'a> FewStepRun<'a> {
         [body.vertices.partition.min_max(&done).1, body.mean(&done)].map(|damage| damage.max(0.0))
     }
 
-    /// The scales of the figures. An extreme that is `unsettled` is no scale of the others.
-    pub(super) fn scales(&self, unsettled: &[String]) -> Vec<f64> {
+    /// The scales of the figures. An extreme that has `not_converged` is no scale of the others.
+    pub(super) fn scales(&self, not_converged: &[String]) -> Vec<f64> {
         let (sizes, forces) = (self.outcome.sizes(self.problem), self.outcome.last.forces);
-        self.problem.figure_scales(&sizes, unsettled, self.history.energy, forces)
+        self.problem.figure_scales(&sizes, not_converged, self.history.energy, forces)
     }
 
     /// The length of the part of Γ_C on which the ends of contact may lie, m: half of an edge for each end.

@@ -80,7 +80,7 @@ impl Outcome {
     /// that grows is no scale.
     fn set_scales(&mut self, problem: &ObservedProblem, measured: &Measured) -> Vec<f64> {
         let scales = |sizes: &[f64], forces: f64| {
-            let scales = problem.figure_scales(sizes, &measured.unsettled, 0.0, forces);
+            let scales = problem.figure_scales(sizes, &measured.not_converged, 0.0, forces);
             let of = |bar: &Bar| problem.figures.number(&bar.name).map_or(0.0, |i| scales[i]);
             Vec::from_iter(self.bars.iter().map(of))
         };
@@ -137,17 +137,17 @@ impl ObservedProblem {
     /// The scale of each figure: the maximum of its group in a run, and at least a part of its natural scale. From the
     /// `largest` [magnitudes](Figures::magnitudes), ‖u‖² (`energy`, N m per metre of thickness) and Σ|f| (`forces`, N per metre of thickness)
     /// of the run. All forces may balance, as in pure bending; their sum of moduli does not vanish.
-    /// An extreme that the meshes leave `unsettled` is no scale of the others.
+    /// An extreme that has `not_converged` over the meshes is no scale of the others.
     pub(crate) fn figure_scales(
         &self,
         largest: &[f64],
-        unsettled: &[String],
+        not_converged: &[String],
         energy: f64,
         forces: f64,
     ) -> Vec<f64> {
         let sizes = || self.figures.iter().zip(largest);
         let most = |is_like: &dyn Fn(&Figure) -> bool| {
-            let like = sizes().filter(|(of, _)| is_like(of) && !unsettled.contains(&of.name));
+            let like = sizes().filter(|(of, _)| is_like(of) && !not_converged.contains(&of.name));
             like.map(|(_, value)| *value).fold(0.0, f64::max)
         };
         let lever = self.body.radius_of_gyration();

@@ -101,7 +101,7 @@ impl<'a> Extremes<'a> {
     }
 
     /// The extremes of the last state of a run with the figures `values`. They name singular points. If they were `measured`,
-    /// only those that the meshes do not settle are singular or not resolved. Collective.
+    /// only those that do not converge over the meshes are singular or not resolved. Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -115,9 +115,9 @@ impl<'a> Extremes<'a> {
         let mut all = extremes.named(&problem.singular_points());
         for extreme in &mut all {
             let part = &problem.figures[problem.part_of(extreme.number, values)];
-            match measured.unsettled.contains(&part.name) {
+            match measured.not_converged.contains(&part.name) {
                 true if extreme.is_known() => {
-                    extreme.unresolved = Some("the meshes do not settle it".to_owned())
+                    extreme.unresolved = Some("it does not converge over the meshes".to_owned())
                 }
                 false if !measured.bars.is_empty() => extreme.singular = None,
                 _ => {}

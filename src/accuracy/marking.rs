@@ -20,7 +20,7 @@ use std::{collections::HashSet, mem::take};
 /// Tuned on the 13 adapted runs. Half: 12 runs miss their accuracy. Twice: 4 % fewer triangles, but a fifth more for
 /// `lshape-rolling`.
 const GOOD_ENOUGH: f64 = 0.8;
-/// If measured errors are too large, a new mesh reduces the estimated errors by at most this factor: excesses on coarse
+/// If measured errors are too large, a new mesh reduces the estimated errors by at most this factor: errors on coarse
 /// meshes are often far too large.
 ///
 /// Tuned on the 13 adapted runs. Half: 4 % more triangles. Twice: 11 % fewer, 6 % more meshes.
@@ -141,13 +141,13 @@ impl<'a> Estimate<'a> {
         let has_points = !self.singular.is_empty() || !self.run.extremes.ends.is_empty();
         let errors = measured.errors(&self.scene().accuracy_of).into_iter();
         let errors = errors.map(|error| {
-            (error.excess(self.accuracy), measured.cause(&error.name, self.run.problem))
+            (error.over_accuracy(self.accuracy), measured.cause(&error.name, self.run.problem))
         });
-        let with_points = |(excess, cause)| match cause {
-            Cause::Reactions if !has_points => (excess, Cause::FIGURE),
-            cause => (excess, cause),
+        let with_points = |(over, cause)| match cause {
+            Cause::Reactions if !has_points => (over, Cause::FIGURE),
+            cause => (over, cause),
         };
-        errors.filter(|(excess, _)| *excess > 1.0).map(with_points).collect()
+        errors.filter(|(over, _)| *over > 1.0).map(with_points).collect()
     }
 
     /// The next mesh. After a measurement it has at least 1.3 times as many triangles, if smaller goals for
@@ -162,11 +162,11 @@ impl<'a> Estimate<'a> {
         /// Tuned on the 13 adapted runs. Half: 5 % fewer triangles. Twice: 19 % more.
         const GROWTH: f64 = 1.3;
         let enough = measured.map_or(0.0, |_| GROWTH * self.mesh.triangles.len() as f64);
-        let levels = self.levels(measured);
+        let halvings_near = self.halvings_near(measured);
         let mut next = refinement.clone();
         for goal in (0..5).map(|power| AIM.powi(power)) {
             next = divided(refinement.clone(), &self.size_ratios(measured, goal))?;
-            next = sharpened(next, &levels)?;
+            next = sharpened(next, &halvings_near)?;
             if next.mesh.triangles.len() as f64 >= enough {
                 break;
             }
@@ -189,8 +189,8 @@ impl<'a> Estimate<'a> {
         let take_smaller = |ratios: &mut [f64], others: Vec<f64>| {
             ratios.iter_mut().zip(others).for_each(|(ratio, other)| *ratio = ratio.min(other));
         };
-        for (excess, cause) in self.missed(measured) {
-            let goal = (goal * AIM / excess).max(MIN_GOAL);
+        for (over, cause) in self.missed(measured) {
+            let goal = (goal * AIM / over).max(MIN_GOAL);
             match cause {
                 Cause::Ends | Cause::Reactions => {}
                 Cause::Change(zeta) => {
@@ -220,7 +220,8 @@ impl<'a> Estimate<'a> {
             }
         }
         // If no estimate shows which triangles are too large, all become smaller.
-        let none = ratios.iter().all(|&ratio| ratio == 1.0) && self.levels(measured).is_empty();
+        let none =
+            ratios.iter().all(|&ratio| ratio == 1.0) && self.halvings_near(measured).is_empty();
         if measured.is_some() && none {
             ratios.fill(smaller.min(HALF));
         }
@@ -229,13 +230,13 @@ impl<'a> Estimate<'a> {
 
     /// How often to halve the triangles at some points. At singular points the squared error falls like h, as at a crack;
     /// together they may cause the part that the others leave. The ends of contact are known up to half of an edge.
-    fn levels(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
-        let halvings = |excess: f64| excess.log2().ceil().max(0.0) as usize;
+    fn halvings_near(&self, measured: Option<&Measurement>) -> Vec<([f64; 2], usize)> {
+        let halvings = |over: f64| over.log2().ceil().max(0.0) as usize;
         let (mut of_reactions, mut of_length, mut points) = (0, 0, Vec::new());
-        for (excess, cause) in self.missed(measured) {
+        for (over, cause) in self.missed(measured) {
             match cause {
                 Cause::Ends => of_length = 2,
-                Cause::Reactions => of_reactions = of_reactions.max(halvings(excess / AIM)),
+                Cause::Reactions => of_reactions = of_reactions.max(halvings(over / AIM)),
                 Cause::Around(at, _) => points.push((at, 1)),
                 _ => {}
             }
@@ -249,6 +250,6 @@ impl<'a> Estimate<'a> {
         let open = if is_known { self.open } else { 0.0 };
         let at_ends = halvings(open / AIM).max(of_length).max(of_reactions);
         let ends = self.run.extremes.ends.as_flattened().iter().map(|&end| (end, at_ends));
-        singular.chain(ends).chain(points).filter(|(_, levels)| *levels > 0).collect()
+        singular.chain(ends).chain(points).filter(|(_, halvings_near)| *halvings_near > 0).collect()
     }
 }

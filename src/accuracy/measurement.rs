@@ -44,7 +44,7 @@ pub(super) struct MeasuredError {
 
 impl MeasuredError {
     /// The error over the error that an accuracy allows.
-    pub(super) fn excess(&self, accuracy: f64) -> f64 {
+    pub(super) fn over_accuracy(&self, accuracy: f64) -> f64 {
         self.relative / (self.share * accuracy)
     }
 }
@@ -115,7 +115,8 @@ impl AccuracyLoop<'_> {
         let mut measured = Measurement::of_fields(&two, &finer, both, coarse, &fine);
         measured.set_bars(&two, coarse, &fine);
         let misses = |measured: &Measurement| {
-            accuracy.is_some_and(|accuracy| measured.excess(accuracy, &scene.accuracy_of) > 1.0)
+            accuracy
+                .is_some_and(|accuracy| measured.over_accuracy(accuracy, &scene.accuracy_of) > 1.0)
         };
         let is_done = two.has_coarser() || misses(&measured);
         if !is_done {
@@ -162,7 +163,7 @@ impl Measurement {
             measured.result.damage = Some(shares.iter().sum::<f64>().sqrt() + before);
             measured.zeta = largest;
         }
-        measured.result.unsettled = self.result.unsettled.clone();
+        measured.result.not_converged = self.result.not_converged.clone();
         measured.set_bars_of_settled(&sequence, coarse);
         Some(measured)
     }
@@ -215,18 +216,18 @@ impl Measurement {
             return;
         }
         let problem = fine.problem;
-        // The extreme of the whole settles if that of its part does.
-        let settles = |extreme: &&Extreme| {
+        // The extreme of the whole converges if that of its part does.
+        let converges = |extreme: &&Extreme| {
             let part = problem.part_of(extreme.number, &fine.outcome.last.figures);
             let part = self.of_points.iter().find(|of| of.number == part).unwrap_or(extreme);
-            sequence.settles(part.number, part)
+            sequence.converges(part.number, part)
         };
-        let unsettled = self.of_points.iter().filter(|of| !settles(of));
-        self.result.unsettled = unsettled.map(|of| of.name.clone()).collect();
+        let not_converged = self.of_points.iter().filter(|of| !converges(of));
+        self.result.not_converged = not_converged.map(|of| of.name.clone()).collect();
         self.set_bars_of_settled(sequence, coarse);
     }
 
-    /// Sets the bars of the figures that the meshes settle. Collective.
+    /// Sets the bars of the figures that converge over the meshes. Collective.
     fn set_bars_of_settled(&mut self, sequence: &Sequence, coarse: &FewStepRun) {
         let problem = coarse.problem;
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
@@ -234,27 +235,27 @@ impl Measurement {
             dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
-        let Measured { bars, unsettled, .. } = &mut self.result;
-        *bars = problem.bars(&errors, &coarse.scales(unsettled));
-        bars.retain(|bar| !unsettled.contains(&bar.name));
+        let Measured { bars, not_converged, .. } = &mut self.result;
+        *bars = problem.bars(&errors, &coarse.scales(not_converged));
+        bars.retain(|bar| !not_converged.contains(&bar.name));
         problem.join_bars(bars, &coarse.outcome.last.figures);
     }
 
     /// Leaves out these figures, whose errors stay while the mesh becomes finer.
     pub(super) fn leave_out(&mut self, names: &[String]) {
         self.result.bars.retain(|bar| !names.contains(&bar.name));
-        self.result.unsettled.extend_from_slice(names);
+        self.result.not_converged.extend_from_slice(names);
     }
 
-    /// Why a figure in `names` has no accuracy, if the meshes do not settle one.
+    /// Why a figure in `names` has no accuracy, if one does not converge over the meshes.
     pub(super) fn without_accuracy(&self, names: &[String]) -> Option<End> {
-        let name = names.iter().find(|name| self.result.unsettled.contains(name))?;
-        Some(End::Unsettled(name.clone()))
+        let name = names.iter().find(|name| self.result.not_converged.contains(name))?;
+        Some(End::NotConverged(name.clone()))
     }
 
     /// The largest measured error in `names`, or of all, over the error that the `accuracy` allows; infinite without errors.
-    pub(super) fn excess(&self, accuracy: f64, names: &[String]) -> f64 {
-        self.errors(names).first().map_or(f64::INFINITY, |worst| worst.excess(accuracy))
+    pub(super) fn over_accuracy(&self, accuracy: f64, names: &[String]) -> f64 {
+        self.errors(names).first().map_or(f64::INFINITY, |worst| worst.over_accuracy(accuracy))
     }
 
     /// The measured errors of the figures and norms in `names`, or of all: the figures, u, the damage

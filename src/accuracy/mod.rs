@@ -35,7 +35,7 @@ mod verdict;
 
 use crate::{
     estimate::Simulation,
-    evolution::{Choices, RunError},
+    evolution::{RunError, RunOptions},
     interrupt::Signal,
     mesh::{Mesh, MeshError, Refinement},
     observe::{Bar, ObservedProblem},
@@ -85,8 +85,8 @@ pub struct Adapted {
 pub struct Measured {
     /// The error bars of the figures; empty if the run ends at ζ_*.
     pub bars: Vec<Bar>,
-    /// The names of the extremes that the meshes do not settle. They have no bars.
-    pub unsettled: Vec<String>,
+    /// The names of the extremes that do not converge over the meshes. They have no bars.
+    pub not_converged: Vec<String>,
     /// The error bar of the time of ζ_*, s.
     pub stop: Option<f64>,
     /// The relative error of the damage ζ₀ − ζ in L² at the end; `None` without damage.
@@ -161,13 +161,13 @@ pub fn adapted(
     session: &Session,
     scene: &Scene,
     mesh: Mesh,
-    choices: &Choices,
+    run_options: &RunOptions,
     accuracy: f64,
     seen: &mut dyn FnMut(&Adapted),
 ) -> Result<Adapted, AdaptError> {
     let scene = with_passing_loads(session, with_steps(scene, INSTANTS), &mesh)?;
     let mut last = None;
-    let ended = AccuracyLoop::new(session, choices, scene).until(accuracy, mesh, &mut |mesh| {
+    let ended = AccuracyLoop::new(session, run_options, scene).until(accuracy, mesh, &mut |mesh| {
         seen(mesh);
         last = Some(mesh.clone());
     });
@@ -190,7 +190,7 @@ pub fn measured_errors(
     session: &Session,
     scene: &Scene,
     mesh: &Mesh,
-    choices: &Choices,
+    run_options: &RunOptions,
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
     let scene = match (of_steps, scene.time.map(|grid| grid.stepping)) {
@@ -200,7 +200,7 @@ pub fn measured_errors(
     };
     let scene = if of_steps.is_none() { with_passing_loads(session, scene, mesh)? } else { scene };
     let mesh = Refinement::start(mesh.clone()).mesh;
-    let mut fixed = AccuracyLoop::new(session, choices, scene);
+    let mut fixed = AccuracyLoop::new(session, run_options, scene);
     loop {
         let problem = problem_on(session, &fixed.scene, &mesh)?;
         let run = fixed.solve(&problem, FEW, &[])?;
@@ -214,7 +214,7 @@ pub fn measured_errors(
 /// The sequence of answers on ever finer meshes.
 struct AccuracyLoop<'a> {
     session: &'a Session,
-    choices: &'a Choices,
+    run_options: &'a RunOptions,
     /// The scene with few time steps.
     scene: Scene,
     limits: Limits,
@@ -226,9 +226,9 @@ struct AccuracyLoop<'a> {
 }
 
 impl<'a> AccuracyLoop<'a> {
-    fn new(session: &'a Session, choices: &'a Choices, scene: Scene) -> Self {
+    fn new(session: &'a Session, run_options: &'a RunOptions, scene: Scene) -> Self {
         let limits = Limits::new(session.comm(), &scene);
-        Self { session, choices, scene, limits, rounds: 0, before: Vec::new(), last: None }
+        Self { session, run_options, scene, limits, rounds: 0, before: Vec::new(), last: None }
     }
 
     /// The loop. A mesh is begun only if its measurement is within the limits too, because only a measurement reaches the
@@ -288,9 +288,9 @@ impl<'a> AccuracyLoop<'a> {
         instants: usize,
         followed: &[f64],
     ) -> Result<FewStepRun<'b>, AdaptError> {
-        let (session, choices) = (self.session, self.choices);
+        let (session, run_options) = (self.session, self.run_options);
         let triangles = problem.mesh().triangles.len();
-        let run = || FewStepRun::run(session, problem, choices, instants, followed);
+        let run = || FewStepRun::run(session, problem, run_options, instants, followed);
         let run = self.limits.measure(triangles, run);
         run.map_err(|source| AdaptError::Run { triangles, source })
     }
@@ -308,7 +308,7 @@ impl<'a> AccuracyLoop<'a> {
             return Ok(Err(End::Limit(limit)));
         }
         let again = self.last.take().and_then(|last| last.on_refined(&self.before, answer, run));
-        let again = again.filter(|of| of.excess(accuracy, &self.scene.accuracy_of) <= 1.0);
+        let again = again.filter(|of| of.over_accuracy(accuracy, &self.scene.accuracy_of) <= 1.0);
         match again.map_or_else(|| self.measurement(answer, run, Some(accuracy)), Ok) {
             Ok(measured) => Ok(Ok(progress.measured(estimate, measured))),
             Err(error) if error.signal().is_some() => Err(error),
@@ -356,7 +356,7 @@ impl<'a> AccuracyLoop<'a> {
         // If the mesh uses nearly the whole accuracy, the tolerance would become ever smaller.
         while steps >= tolerance / 64.0 {
             problem.set_step_tolerance(steps);
-            let run = Simulation::new(&problem).choices(self.choices).run(self.session);
+            let run = Simulation::new(&problem).run_options(self.run_options).run(self.session);
             let Ok(mut outcome) = run else { return Ok(()) };
             outcome.set_bars(&problem, &adapted.measured)?;
             if outcome.stopped.is_some() != stops {

@@ -116,11 +116,11 @@ impl<'a> Sequence<'a> {
         ])
     }
 
-    /// Does the figure `i` settle, an extreme at the place of `extreme` on the finest mesh? Its change per halving of the size
+    /// Does the figure `i` converge over the meshes, an extreme at the place of `extreme` on the finest mesh? Its change per halving of the size
     /// of the triangles there is small, or falls: for a singular stress r^(λ−1) it grows, and for ln r it stays. Near a
-    /// singular point only meshes bisected everywhere contradict theory. Elsewhere an extreme settles until meshes of
+    /// singular point only meshes bisected everywhere contradict theory. Elsewhere an extreme converges until meshes of
     /// different sizes show that it grows.
-    pub(super) fn settles(&self, i: usize, extreme: &Extreme) -> bool {
+    pub(super) fn converges(&self, i: usize, extreme: &Extreme) -> bool {
         if extreme.unresolved.is_some() {
             return false;
         }

@@ -80,15 +80,15 @@ pub(super) fn divided(mut refinement: Refinement, ratios: &[f64]) -> Result<Refi
     }
 }
 
-/// Halves the triangles that touch a point `levels` times, for each point.
+/// Halves the triangles that touch a point `halvings` times, for each point.
 pub(super) fn sharpened(
     mut refinement: Refinement,
     points: &[([f64; 2], usize)],
 ) -> Result<Refinement, MeshError> {
-    let most = points.iter().map(|(_, levels)| *levels).max().unwrap_or(0);
+    let most = points.iter().map(|(_, halvings)| *halvings).max().unwrap_or(0);
     // Two bisections halve the size.
     for bisections in 0..2 * most {
-        let left = points.iter().filter(|(_, levels)| bisections < 2 * levels);
+        let left = points.iter().filter(|(_, halvings)| bisections < 2 * halvings);
         let left: Vec<[f64; 2]> = left.map(|(point, _)| *point).collect();
         refinement = refinement.refine(&touching(&refinement.mesh, &left))?;
     }

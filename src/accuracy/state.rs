@@ -3,7 +3,7 @@
 use super::{AdaptError, Adapted, Measured, adapted, measured_errors};
 use crate::{
     advice::locks,
-    evolution::{Choices, Outcome},
+    evolution::{Outcome, RunOptions},
     mesh::Mesh,
     observe::ObservedProblem,
     petsc::Session,
@@ -39,9 +39,9 @@ impl LoopState {
         seen: &mut dyn FnMut(&Adapted),
     ) -> Result<(Self, Mesh), AdaptError> {
         let saved = saved.filter(|state| state.adapted.is_some());
-        let (mut state, choices) = (saved.unwrap_or_default(), Choices::of(scene));
+        let (mut state, run_options) = (saved.unwrap_or_default(), RunOptions::of(scene));
         if let (None, Some(accuracy)) = (&state.adapted, scene.accuracy) {
-            let found = adapted(session, scene, mesh.clone(), &choices, accuracy, seen)?;
+            let found = adapted(session, scene, mesh.clone(), &run_options, accuracy, seen)?;
             (state.measured, state.adapted) = (found.measured.clone(), Some(found));
         }
         let Some(Adapted { mesh, steps, damage, .. }) = &state.adapted else {
@@ -72,7 +72,7 @@ impl LoopState {
             self.notes.push(note.to_owned());
             return Ok(Measured::default());
         }
-        match measured_errors(session, scene, mesh, &Choices::of(scene), of_steps) {
+        match measured_errors(session, scene, mesh, &RunOptions::of(scene), of_steps) {
             // The scene fits this mesh, perhaps not the finer one.
             Err(error) if error.signal().is_none() => {
                 self.notes.push(format!("the error bars could not be measured: {error}"));

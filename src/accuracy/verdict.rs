@@ -26,9 +26,9 @@ pub(super) enum End {
     /// A run on a finer mesh failed, or a triangle cannot be divided.
     #[error("{0}")]
     Failed(String),
-    /// An accuracy is required of an extreme that the meshes do not settle.
+    /// An accuracy is required of an extreme that does not converge over the meshes.
     #[error("{0} changes with every finer mesh, as a singular stress does; ask for other figures")]
-    Unsettled(String),
+    NotConverged(String),
     /// The error of a figure stays.
     #[error(
         "the error of {0} stays while the mesh becomes finer; --accuracy-of NAME,… asks for others"
@@ -50,15 +50,15 @@ pub(super) struct Progress {
     /// Per mesh that resolves the data of the scene: the triangles and the estimated error.
     estimates: Vec<(usize, f64)>,
     /// Per measurement: the triangles and the measured errors.
-    excesses: Vec<(usize, BTreeMap<String, f64>)>,
+    errors: Vec<(usize, BTreeMap<String, f64>)>,
     /// The extremes whose errors stay while the mesh becomes finer.
-    unsettled: BTreeSet<String>,
+    not_converged: BTreeSet<String>,
 }
 
 impl Progress {
     pub(super) fn new(accuracy: f64) -> Self {
-        let (estimates, excesses, unsettled) = Default::default();
-        Self { accuracy, estimates, excesses, unsettled }
+        let (estimates, errors, not_converged) = Default::default();
+        Self { accuracy, estimates, errors, not_converged }
     }
 
     /// Adds a mesh with its estimated error, if it resolves the data.
@@ -76,14 +76,14 @@ impl Progress {
         mut measured: Measurement,
     ) -> Measurement {
         let errors = measured.errors(&[]).into_iter();
-        let errors = errors.map(|error| (error.excess(self.accuracy), error.name));
-        let errors = (mesh.triangles.len(), errors.map(|(excess, name)| (name, excess)).collect());
-        self.excesses.push(errors);
+        let errors = errors.map(|error| (error.over_accuracy(self.accuracy), error.name));
+        let errors = (mesh.triangles.len(), errors.map(|(over, name)| (name, over)).collect());
+        self.errors.push(errors);
         let extremes = run.problem.figures.iter().filter(|of| of.is_extreme());
         let stay = extremes.map(|of| &of.name).filter(|name| self.stays(name));
         let stay = Vec::from_iter(stay.cloned());
-        self.unsettled.extend(stay);
-        measured.leave_out(&Vec::from_iter(self.unsettled.iter().cloned()));
+        self.not_converged.extend(stay);
+        measured.leave_out(&Vec::from_iter(self.not_converged.iter().cloned()));
         measured
     }
 
@@ -96,9 +96,11 @@ impl Progress {
     ) -> Result<(), End> {
         let names = &estimate.scene().accuracy_of;
         let errors = measured.map_or_else(Vec::new, |of| of.errors(names));
-        let unsettled = measured.and_then(|of| of.without_accuracy(names));
-        let within = errors.first().is_some_and(|worst| worst.excess(self.accuracy) <= 1.0);
-        match unsettled.or_else(|| if within { Some(End::Reached) } else { self.stuck(&errors) }) {
+        let not_converged = measured.and_then(|of| of.without_accuracy(names));
+        let within = errors.first().is_some_and(|worst| worst.over_accuracy(self.accuracy) <= 1.0);
+        match not_converged
+            .or_else(|| if within { Some(End::Reached) } else { self.stuck(&errors) })
+        {
             Some(end) => Err(end),
             None if rounds >= MAX_ROUNDS => Err(End::Rounds),
             None => Ok(()),
@@ -107,7 +109,7 @@ impl Progress {
 
     /// Why no further mesh can reach the accuracy, if the largest error stays.
     fn stuck(&self, errors: &[MeasuredError]) -> Option<End> {
-        let is_missed = |error: &&MeasuredError| error.excess(self.accuracy) > 1.0;
+        let is_missed = |error: &&MeasuredError| error.over_accuracy(self.accuracy) > 1.0;
         match errors.first().filter(is_missed) {
             Some(worst) => self.stays(&worst.name).then(|| End::Stays(worst.name.clone())),
             None => self.is_not_of_the_mesh().then_some(End::NotOfTheMesh),
@@ -118,14 +120,14 @@ impl Progress {
     /// or in some measurements before. Only measurements count in which it was too large: after each of them the triangles
     /// that cause it became smaller. Of first order it would be a third.
     fn stays(&self, name: &str) -> bool {
-        let [earlier @ .., (triangles, last)] = &self.excesses[..] else { return false };
+        let [earlier @ .., (triangles, last)] = &self.errors[..] else { return false };
         let missed = |of: &BTreeMap<String, f64>| of.get(name).copied().filter(|of| *of > 1.0);
         let Some(last) = missed(last) else { return false };
         let earlier = earlier.iter().filter_map(|(count, of)| Some((*count, missed(of)?)));
         let earlier: Vec<(usize, f64)> = earlier.collect();
         let much_coarser = earlier.iter().filter(|(count, _)| 8 * count <= *triangles);
         let some = earlier.len().checked_sub(BEFORE).map_or(&[][..], |first| &earlier[first..]);
-        let before = much_coarser.chain(some).map(|(_, excess)| *excess);
+        let before = much_coarser.chain(some).map(|(_, over)| *over);
         before.reduce(f64::max).is_some_and(|largest| last > 0.5 * largest)
     }
 
@@ -134,7 +136,7 @@ impl Progress {
     fn is_not_of_the_mesh(&self) -> bool {
         let Some(&(triangles, last)) = self.estimates.last() else { return false };
         let before = self.estimates.iter().filter(|(count, _)| 64 * count <= triangles);
-        let largest = before.map(|(_, excess)| *excess).reduce(f64::max);
+        let largest = before.map(|(_, over)| *over).reduce(f64::max);
         last > 1.0 && largest.is_some_and(|largest| last > 0.5 * largest)
     }
 }

@@ -123,9 +123,9 @@ impl ObservedProblem {
             all.extend(self.penetrations(state).into_iter().map(|of| (of.depth / limit(&of), of)));
             displacement = displacement.max(self.body.nodes.partition.max_norm(&state.u));
         }
-        let (excess, deepest) = all.into_iter().max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        let (noted_below, deepest) = all.into_iter().max_by(|(a, _), (b, _)| a.total_cmp(b))?;
         let Penetration { depth, at, boundary, .. } = deepest;
-        (excess > displacement).then(|| {
+        (noted_below > displacement).then(|| {
             format!(
                 "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at {}, {:.2} % of the largest \
                  displacement: displacements and forces may be far off; refine the mesh there, or set accuracy",

@@ -6,7 +6,7 @@ use serde_json::json;
 use signorini::{
     contact::Bound,
     estimate::Simulation,
-    evolution::{Choices, RunError, Step},
+    evolution::{RunError, RunOptions, Step},
     fem::{DamageSystem, NodalBases, Stiffness, source, source_load},
     observe::ObservedProblem,
     output::{check_is_own, create, terminal::say, write_whole},
@@ -176,7 +176,7 @@ fn files(
         let system = DamageSystem::new(session, body, mass, &problem.diffusions(), 1.0)?;
         let phi = source(
             body,
-            (&Choices::of(problem.scene()).source, laws),
+            (&RunOptions::of(problem.scene()).source, laws),
             &body.strains(&before.u),
             &before.zeta,
         )

@@ -3,7 +3,7 @@
 use super::estimated;
 use crate::{
     contact::ContactSolver,
-    evolution::{Choices, Observer, Outcome, RunError, RunState, Step, all_steps},
+    evolution::{Observer, Outcome, RunError, RunOptions, RunState, Step, all_steps},
     model::DamageSource,
     observe::ObservedProblem,
     petsc::Session,
@@ -30,7 +30,7 @@ use crate::{
 /// ```
 pub struct Simulation<'a> {
     problem: &'a ObservedProblem,
-    choices: Choices,
+    run_options: RunOptions,
     observer: Option<&'a mut dyn Observer>,
     saved: Option<RunState>,
     bounds_error: bool,
@@ -39,34 +39,34 @@ pub struct Simulation<'a> {
 impl<'a> Simulation<'a> {
     /// A run with the contact solver of the scene, or the default one, and the paper's damage source.
     pub fn new(problem: &'a ObservedProblem) -> Self {
-        let choices = Choices::of(problem.scene());
-        Self { problem, choices, observer: None, saved: None, bounds_error: false }
+        let run_options = RunOptions::of(problem.scene());
+        Self { problem, run_options, observer: None, saved: None, bounds_error: false }
     }
 
     /// Takes a contact solver of another author. Its answers are certified as ours are, and the default solver gives the
     /// answer of a step that it misses, unless the scene says `contact.rescue = false`.
     #[must_use]
     pub fn solver(self, solver: Box<dyn ContactSolver>) -> Self {
-        Self { choices: self.choices.solver(solver), ..self }
+        Self { run_options: self.run_options.solver(solver), ..self }
     }
 
     /// Takes the contact solver of this name, see [`REGISTRY`](crate::contact::REGISTRY).
     #[must_use]
     pub fn solver_named(self, name: &str) -> Self {
-        Self { choices: self.choices.solver_named(name), ..self }
+        Self { run_options: self.run_options.solver_named(name), ..self }
     }
 
     /// Takes a damage source of another author. The scene must have `[damage]`, whose constants the source may use, and
     /// `[time]`; otherwise the run is refused.
     #[must_use]
     pub fn law(self, source: Box<dyn DamageSource>) -> Self {
-        Self { choices: self.choices.law(source), ..self }
+        Self { run_options: self.run_options.law(source), ..self }
     }
 
     /// Takes the contact solver and the damage source of another run.
     #[must_use]
-    pub fn choices(self, choices: &Choices) -> Self {
-        Self { choices: choices.clone(), ..self }
+    pub fn run_options(self, run_options: &RunOptions) -> Self {
+        Self { run_options: run_options.clone(), ..self }
     }
 
     /// Adds the observer, which sees every accepted step, and may keep checkpoints and end the run.
@@ -75,7 +75,7 @@ impl<'a> Simulation<'a> {
         Self { observer: Some(observer), ..self }
     }
 
-    /// Starts from a checkpoint, of a run with the same problem and choices.
+    /// Starts from a checkpoint, of a run with the same problem and run_options.
     #[must_use]
     pub fn resume(self, saved: RunState) -> Self {
         Self { saved: Some(saved), ..self }
@@ -92,10 +92,10 @@ impl<'a> Simulation<'a> {
     /// # Errors
     /// See [`RunError`]; every accepted step has been seen by then.
     pub fn run(self, session: &Session) -> Result<Outcome, RunError> {
-        let Self { problem, choices, observer, saved, bounds_error } = self;
+        let Self { problem, run_options, observer, saved, bounds_error } = self;
         let mut ignore = |_: &Step| Ok(());
         let observer = observer.unwrap_or(&mut ignore);
-        let run = all_steps(session, problem, &choices, observer, saved, &[])?;
+        let run = all_steps(session, problem, &run_options, observer, saved, &[])?;
         estimated(run, bounds_error)
     }
 }

@@ -38,7 +38,7 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    Choices, DiscreteProblem, LoadCase, ObservedProblem, RunError, State, Step, StepFailure,
+    DiscreteProblem, LoadCase, ObservedProblem, RunError, RunOptions, State, Step, StepFailure,
     StepRecord, agreed, extrapolation::Extrapolation,
 };
 use crate::{
@@ -113,14 +113,14 @@ const MAX_DISPLACEMENT: f64 = 1e150;
 const SQUARED: RangeInclusive<f64> = 1e-140..=f64::MAX;
 
 impl<'a> ContactStep<'a> {
-    /// The contact step with the contact solver of `choices`.
+    /// The contact step with the contact solver of `run_options`.
     ///
     /// # Errors
     /// There is no solver of that name, or PETSc failed.
     pub fn new(
         session: &'a Session,
         problem: &'a ObservedProblem,
-        choices: &Choices,
+        run_options: &RunOptions,
     ) -> Result<Self, RunError> {
         let (body, constraints) = (&problem.body, &problem.constraints);
         let (comm, unknowns) = (body.comm(), 2 * body.nodes.partition.owned());
@@ -129,7 +129,7 @@ impl<'a> ContactStep<'a> {
         })?;
         let options = &problem.scene().contact;
         let has_bounds = comm.any(!constraints.bounds.is_empty());
-        let solvers = contact::solvers(&choices.solver, has_bounds, options)?;
+        let solvers = contact::solvers(&run_options.solver, has_bounds, options)?;
         // A preconditioner needs only single precision, which halves the bytes to read.
         let precision = Precision::Preconditioner;
         let accepted = AcceptedState {

@@ -26,7 +26,7 @@
 //! What crosses the door: `command` starts a run of an [`ObservedProblem`] with an [`Observer`], which sees every
 //! accepted [`Step`], by way of `estimate`, which enters its error estimates in the [`Outcome`].
 
-mod choices;
+mod run_options;
 mod contact_step;
 mod damage_step;
 mod error;
@@ -43,7 +43,6 @@ pub use crate::{
     observe::{ContactRow, ObservedProblem, Supports},
     problem::{DiscreteProblem, Loads, SetupError, State},
 };
-pub use choices::Choices;
 pub use contact_step::{Accuracy, ContactStep};
 pub(crate) use damage_step::DamageStep;
 pub use error::{RunError, StepFailure};
@@ -51,6 +50,7 @@ pub use error_budget::{ErrorBudget, percent};
 pub use extrapolation::Extrapolation;
 pub use observer::{Next, Observed, Observer};
 pub use outcome::{BoundViolation, Outcome, Stop};
+pub use run_options::RunOptions;
 pub use state::{GoverningValue, Step, StepRecord};
 pub use step_controller::AIM;
 pub(crate) use step_controller::StepController;
@@ -66,7 +66,7 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use step_controller::{Decision, StepState};
 
-/// Solves Problem VP^hk with the `choices` of its parts. The `observer` sees every accepted step, and may keep
+/// Solves Problem VP^hk with these `run_options`. The `observer` sees every accepted step, and may keep
 /// checkpoints and end the run. It starts from `saved`, if given. Adaptive steps end at the times `followed` of another
 /// run. Everything at the end is returned, without error estimates.
 ///
@@ -75,17 +75,17 @@ use step_controller::{Decision, StepState};
 pub(crate) fn all_steps<'a>(
     session: &'a Session,
     problem: &'a ObservedProblem,
-    choices: &'a Choices,
+    run_options: &'a RunOptions,
     observer: &mut dyn Observer,
     saved: Option<RunState>,
     followed: &'a [f64],
 ) -> Result<Run<'a>, RunError> {
-    let law = &choices.source;
+    let law = &run_options.source;
     if matches!(law, ChosenSource::Own(_)) && problem.damage().is_none() {
         return Err(RunError::NoDamage);
     }
     let damage_step = DamageStep { session, problem, law, system: None, loaded: None };
-    let mut contact_step = ContactStep::new(session, problem, choices)?;
+    let mut contact_step = ContactStep::new(session, problem, run_options)?;
     let (zeta, start) = (problem.initial_damage(), problem.scene().start());
     let (mut first, mut source) = Default::default();
     if saved.is_none() {

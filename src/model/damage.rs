@@ -47,7 +47,7 @@ impl DamageSource for Fremond {
     }
 }
 
-/// The damage source of a run. A scene gets its own by `Choices::of`.
+/// The damage source of a run. A scene gets its own by `RunOptions::of`.
 #[derive(Clone)]
 pub enum ChosenSource {
     /// The paper's.

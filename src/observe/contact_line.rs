@@ -38,7 +38,7 @@ pub struct ContactLine {
     /// The line nodes at which closed parts begin and end in a vertex without a corner.
     seams: Vec<[usize; 2]>,
     /// The two line nodes of each vertex between materials: the end of an edge, and the start of the next one.
-    joints: Vec<[usize; 2]>,
+    interface_nodes: Vec<[usize; 2]>,
     /// Per number of a boundary: its gap g(x, y, t), m.
     gaps: BTreeMap<usize, Expression>,
 }
@@ -119,13 +119,13 @@ impl ContactLine {
             }
         }
         line.places = joined_faces(places);
-        let joints = between.iter().flat_map(|node| line.places.get(node)).flatten();
+        let interface_nodes = between.iter().flat_map(|node| line.places.get(node)).flatten();
         let pair = |(_, places): &(BoundaryFace, Vec<Place>)| match places[..] {
             [(a, _), (b, _)] if line.beside(a, -1, 1).is_some() => Some([a, b]),
             [(a, _), (b, _)] => Some([b, a]),
             _ => None,
         };
-        line.joints = joints.filter_map(pair).collect();
+        line.interface_nodes = interface_nodes.filter_map(pair).collect();
         line
     }
 
@@ -227,7 +227,7 @@ impl ContactLine {
         is_beside.then_some((length, number))
     }
 
-    /// The reactions at all line nodes in order, on every rank, with those of joints in proportion to lengths. Collective.
+    /// The reactions at all line nodes in order, on every rank, with those of interface nodes in proportion to lengths. Collective.
     fn reactions(&self, body: &Body, state: &State) -> Vec<Reaction> {
         let reactions = |point: &ContactPoint| {
             let ContactPoint { normal, force, pressure, gap, active, .. } = *point;
@@ -248,22 +248,23 @@ impl ContactLine {
         all
     }
 
-    /// The force to move from the first to the second line node of each joint, N per metre of thickness, and the places of both
+    /// The force to move from the first to the second line node of each pair of interface nodes, N per metre of thickness, and the places of both
     /// in `all` reactions.
     fn moved<'a>(&'a self, all: &'a [Reaction]) -> impl Iterator<Item = ([usize; 2], f64)> + 'a {
         let place = |k: usize| all.binary_search_by(|of| of[0].total_cmp(&(k as f64))).ok();
-        // Another joint does not know its pressures yet.
-        let is_joint = |line_node: &usize| self.joints.as_flattened().contains(line_node);
+        // Another interface node does not know its pressures yet.
+        let is_interface =
+            |line_node: &usize| self.interface_nodes.as_flattened().contains(line_node);
         let extrapolated = move |line_node: usize, direction: isize| {
             let beside = |steps: isize| {
                 let (length, number) = self.beside(line_node, direction, steps)?;
-                Some((length, all[place(number)?][5])).filter(|_| !is_joint(&number))
+                Some((length, all[place(number)?][5])).filter(|_| !is_interface(&number))
             };
             let (length, p) = beside(1)?;
             let slope = beside(2).map(|(farther, q)| (p - q) / (farther - length));
             Some(p + slope.unwrap_or(0.0) * length)
         };
-        self.joints.iter().filter_map(move |&[a, b]| {
+        self.interface_nodes.iter().filter_map(move |&[a, b]| {
             let jump = extrapolated(b, 1)? - extrapolated(a, -1)?;
             let places = [place(a)?, place(b)?];
             let [(f, p), (g, _)] = places.map(|i| (all[i][4], all[i][5]));
@@ -272,7 +273,7 @@ impl ContactLine {
         })
     }
 
-    /// The forces to move between boundaries at joints, on the first rank alone: the numbers of both boundaries, the place, m,
+    /// The forces to move between boundaries at interface nodes, on the first rank alone: the numbers of both boundaries, the place, m,
     /// and the force on the body, N per metre of thickness. Collective.
     pub(super) fn moved_forces(
         &self,
@@ -280,7 +281,7 @@ impl ContactLine {
         state: &State,
     ) -> Vec<([usize; 2], [f64; 2], [f64; 2])> {
         let boundaries = |of: &[usize; 2]| of.map(|line_node| self.line_nodes[line_node].boundary);
-        if !self.joints.iter().map(boundaries).any(|[a, b]| a != b) {
+        if !self.interface_nodes.iter().map(boundaries).any(|[a, b]| a != b) {
             return Vec::new();
         }
         let all = self.reactions(body, state);

@@ -3,7 +3,7 @@
 use crate::support::{adapted, scene, solved, square};
 use signorini::{
     accuracy::{self, Adapted},
-    evolution::{Choices, ObservedProblem, Outcome},
+    evolution::{ObservedProblem, Outcome, RunOptions},
     mesh::Mesh,
     observe::Bar,
     petsc::Session,
@@ -40,7 +40,8 @@ fn with_bars(scene: &Scene, n: usize) -> (ObservedProblem, Outcome) {
     let mut outcome = solved(scene.clone(), square(n));
     let session = Session::start(&[]).unwrap();
     let measured =
-        accuracy::measured_errors(&session, scene, &square(n), &Choices::of(scene), None).unwrap();
+        accuracy::measured_errors(&session, scene, &square(n), &RunOptions::of(scene), None)
+            .unwrap();
     outcome.set_bars(&problem, &measured).expect("PETSc works");
     (problem, outcome)
 }
@@ -56,8 +57,13 @@ fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one(
         for n in [4, 8, 16] {
             let found = figures(&solved(scene.clone(), square(n)));
             let session = Session::start(&[]).unwrap();
-            let bars =
-                accuracy::measured_errors(&session, &scene, &square(n), &Choices::of(&scene), None);
+            let bars = accuracy::measured_errors(
+                &session,
+                &scene,
+                &square(n),
+                &RunOptions::of(&scene),
+                None,
+            );
             let bars = bars.unwrap_or_else(|error| panic!("{error}"));
             let names = ["work", "displacement_max", "contact_force"];
             for ((name, found), exact) in names.iter().zip(found).zip(exact) {
@@ -100,7 +106,7 @@ fn a_figure_asked_for_alone_takes_a_smaller_mesh() {
     let session = Session::start(&[]).unwrap();
     let wrong = block(2, "accuracy = 3e-3\naccuracy_of = ['contact_forces']", "0", "-5");
     let found =
-        accuracy::adapted(&session, &wrong, square(2), &Choices::of(&wrong), 3e-3, &mut |_| {});
+        accuracy::adapted(&session, &wrong, square(2), &RunOptions::of(&wrong), 3e-3, &mut |_| {});
     let message = found.err().map_or_else(String::new, |error| error.to_string());
     assert!(message.contains("did you mean `contact_force`"), "{message}");
 }

@@ -7,7 +7,7 @@ use crate::support::{ORDERS, distorted, layered, moved, problem, square, turn, u
 use nalgebra::{DMatrix, DVector, Vector3};
 use signorini::{
     estimate::{EquilibratedStress, Simulation},
-    evolution::{Choices, ContactStep, State},
+    evolution::{ContactStep, RunOptions, State},
     fem::{Body, Location},
     mesh::{Mesh, Order, Refinement},
     observe::ObservedProblem,
@@ -53,8 +53,8 @@ fn true_error(problem: &ObservedProblem, state: &State) -> f64 {
     scene.order = Order::Quadratic;
     let fine = ObservedProblem::new(scene, finer.mesh).unwrap();
     let session = Session::start(&[]).unwrap();
-    let choices = Choices::of(fine.scene());
-    let mut step = ContactStep::new(&session, &fine, &choices).unwrap();
+    let run_options = RunOptions::of(fine.scene());
+    let mut step = ContactStep::new(&session, &fine, &run_options).unwrap();
     let exact = step.solve(0, state.time, &zeta).unwrap().state.u;
     let difference = difference(body, &state.u, &fine.body, &parents, &exact);
     let own = square_norm(problem, &state.zeta, &state.u);
@@ -345,8 +345,8 @@ fn balanced(
     let degree = problem.scene().order as usize + 1;
     let session = Session::start(&[]).unwrap();
     let state = Simulation::new(&problem).run(&session).unwrap().last.state;
-    let choices = Choices::of(problem.scene());
-    let mut step = ContactStep::new(&session, &problem, &choices).unwrap();
+    let run_options = RunOptions::of(problem.scene());
+    let mut step = ContactStep::new(&session, &problem, &run_options).unwrap();
     let state = step.solve(0, state.time, &state.zeta).unwrap().state;
     let mut stress = EquilibratedStress::new(&mut step, &state).unwrap().unwrap();
     stress.improve();

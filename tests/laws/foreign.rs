@@ -12,7 +12,7 @@ use signorini::{
         solvers,
     },
     estimate::Simulation,
-    evolution::{Choices, Next, Observed, Observer, Outcome, RunState, Step},
+    evolution::{Next, Observed, Observer, Outcome, RunOptions, RunState, Step},
     linear::LinearSolver,
     model::{DamagePoint, DamageSource},
     observe::ObservedProblem,
@@ -199,14 +199,14 @@ fn a_run_with_foreign_parts_goes_on_from_a_checkpoint_bit_by_bit() {
 fn a_mesh_for_an_accuracy_and_its_bars_are_those_of_our_parts() {
     let text = "[[probe]]\nname = 'middle'\npoint = [0.5, 0.5]";
     let (scene, session) = (block(1, text), Session::start(&[]).unwrap());
-    let adapted = |choices: &Choices| {
-        accuracy::adapted(&session, &scene, square(4), choices, 0.1, &mut |_| {}).unwrap()
+    let adapted = |run_options: &RunOptions| {
+        accuracy::adapted(&session, &scene, square(4), run_options, 0.1, &mut |_| {}).unwrap()
     };
     let named = ChosenSolver::Named("penalty-duality".to_owned());
     let solver = solvers(&named, true, &scene.contact).unwrap().remove(0);
     let solver = Box::new(Other(Some(solver)));
-    let own = adapted(&Choices::of(&scene).solver(solver).law(Box::new(Source(paper))));
-    let ours = adapted(&Choices::of(&scene));
+    let own = adapted(&RunOptions::of(&scene).solver(solver).law(Box::new(Source(paper))));
+    let ours = adapted(&RunOptions::of(&scene));
     assert_eq!(own.mesh.triangles, ours.mesh.triangles);
     assert!(ours.mesh.triangles.len() > 64, "the mesh was refined");
     assert!(!ours.measured.bars.is_empty());

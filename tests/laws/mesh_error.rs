@@ -4,14 +4,14 @@ use crate::support::{problem, run, scene, square};
 use signorini::{
     accuracy::{self, Measured},
     contact::SOLVERS,
-    evolution::{Choices, Outcome},
+    evolution::{Outcome, RunOptions},
     petsc::Session,
 };
 
 /// The measured errors of a scene on a square of n × n cells.
 fn measured(text: &str, n: usize) -> Measured {
     let (scene, session) = (scene(text), Session::start(&[]).unwrap());
-    accuracy::measured_errors(&session, &scene, &square(n), &Choices::of(&scene), None).unwrap()
+    accuracy::measured_errors(&session, &scene, &square(n), &RunOptions::of(&scene), None).unwrap()
 }
 
 /// A sheared square on a foundation.

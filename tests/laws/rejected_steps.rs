@@ -4,7 +4,7 @@ use crate::support::{Random, close, difference, distorted, history, problem, sam
 use signorini::{
     contact::SOLVERS,
     estimate::Simulation,
-    evolution::{Choices, ContactStep, ObservedProblem, RunError, Step},
+    evolution::{ContactStep, ObservedProblem, RunError, RunOptions, Step},
     petsc::Session,
 };
 
@@ -35,7 +35,7 @@ fn zeta(problem: &ObservedProblem, mean: f64) -> Vec<f64> {
 fn second_step(problem: &ObservedProblem, solver: &str, tries: &[(f64, Vec<f64>, bool)]) -> Step {
     let session = Session::start(&[]).unwrap();
     let mut contact_step =
-        ContactStep::new(&session, problem, &Choices::of(problem.scene()).solver_named(solver))
+        ContactStep::new(&session, problem, &RunOptions::of(problem.scene()).solver_named(solver))
             .unwrap();
     contact_step.solve(1, 0.9, &zeta(problem, 0.9)).unwrap();
     contact_step.accept(0.9).unwrap();

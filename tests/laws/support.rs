@@ -10,7 +10,7 @@ use signorini::{
     accuracy::{self, Adapted},
     contact::SOLVERS,
     estimate::Simulation,
-    evolution::{Choices, ObservedProblem, Outcome, RunError, SetupError, Step},
+    evolution::{ObservedProblem, Outcome, RunError, RunOptions, SetupError, Step},
     mesh::{self, Curve, Mesh, Order},
     model::DamageLaw,
     petsc::Session,
@@ -144,7 +144,8 @@ pub fn adapted(scene: &Scene, mesh: Mesh, accuracy: f64) -> Adapted {
     let session = Session::start(&[]).unwrap();
     let mut triangles = 0;
     let mut seen = |mesh: &Adapted| triangles = mesh.mesh.triangles.len();
-    let found = accuracy::adapted(&session, scene, mesh, &Choices::of(scene), accuracy, &mut seen);
+    let found =
+        accuracy::adapted(&session, scene, mesh, &RunOptions::of(scene), accuracy, &mut seen);
     let found = found.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(triangles, found.mesh.triangles.len(), "the last mesh shown is the answer");
     found

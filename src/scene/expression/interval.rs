@@ -2,7 +2,7 @@
 //!
 //! The natural interval extension (Moore, Kearfott, Cloud, *Introduction to Interval Analysis*, 2009,
 //! chapter 5): each instruction maps intervals that contain its arguments to an interval that contains its
-//! values. The bounds are sharp if each variable occurs once; otherwise their excess decreases with the size
+//! values. The bounds are sharp if each variable occurs once; otherwise their overestimation decreases with the size
 //! of the box. They ignore rounding errors.
 
 use super::{

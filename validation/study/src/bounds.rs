@@ -4,7 +4,7 @@ use crate::StudyError;
 use serde::Serialize;
 use signorini::{
     estimate::Simulation,
-    evolution::{Choices, ContactStep, Step},
+    evolution::{ContactStep, RunOptions, Step},
     fem::{Body, Location},
     mesh::{self, Order, Refinement},
     observe::ObservedProblem,
@@ -70,9 +70,9 @@ pub fn errors(session: &Session, scene: &Path, overrides: &[String]) -> Result<E
     let mut fine = scene;
     fine.order = Order::Quadratic;
     let fine = ObservedProblem::new(fine, finer.mesh)?;
-    let choices = Choices::of(fine.scene());
+    let run_options = RunOptions::of(fine.scene());
     let seconds = stage_seconds();
-    let exact = ContactStep::new(session, &fine, &choices)?.solve(0, state.time, &zeta)?;
+    let exact = ContactStep::new(session, &fine, &run_options)?.solve(0, state.time, &zeta)?;
     let own = interpolated(body, &state.u, &fine.body, &parents);
     let error: Vec<f64> = exact.state.u.iter().zip(&own).map(|(u, own)| u - own).collect();
     let energy = |problem: &ObservedProblem, zeta: &[f64], u: &[f64]| {

@@ -3,7 +3,7 @@
 use crate::StudyError;
 use signorini::{
     estimate::Simulation,
-    evolution::{Choices, ContactStep, ObservedProblem, Outcome, RunError, SetupError, Step},
+    evolution::{ContactStep, ObservedProblem, Outcome, RunError, RunOptions, SetupError, Step},
     mesh::Mesh,
     petsc::Session,
     scene::Scene,
@@ -77,7 +77,7 @@ pub fn solve(
     guess: Option<&[f64]>,
 ) -> Result<Result<Step, RunError>, StudyError> {
     let mut contact_step =
-        ContactStep::new(session, problem, &Choices::of(problem.scene()).solver_named(solver))?;
+        ContactStep::new(session, problem, &RunOptions::of(problem.scene()).solver_named(solver))?;
     if let Some(guess) = guess {
         contact_step.set_warm_start(guess);
     }
