@@ -3,7 +3,7 @@
 //! A run solves a discrete problem. This room estimates the difference from the exact solution of the scene:
 //!
 //! - [`RecoveredStrains`]: the error of u in the energy norm, per triangle, from strains fitted around each vertex
-//!   (the same strains give the [`NodalStress`](crate::problem::NodalStress) of pictures);
+//!   (the same strains give the [`NodalStress`](crate::observe::NodalStress) of pictures);
 //! - [`EquilibratedStress`]: a proved bound on the error of u from the mesh, if it is asked for ([`Simulation::bound`]);
 //! - [`ErrorBudget`]: the errors by the mesh, the time steps and the solver.
 //!
