@@ -6,7 +6,7 @@ use crate::{
     petsc::PetscError,
     problem::{
         Bar, Dimension, DiscreteProblem, Figure, NEGLIGIBLE_DAMAGE, Observation, Of, SAMPLE_TIMES,
-        State, Value,
+        State, Value, missed_mean,
     },
 };
 use nalgebra::DVector;
@@ -111,9 +111,11 @@ impl DiscreteProblem {
             let most = largest.entry(&of.group).or_default();
             *most = most.max(*error);
         }
+        let missed = missed_mean(self);
         let bar = |(of, (&error, &scale)): (&Figure, (&f64, &f64))| {
             let least = largest.get(&*of.group).filter(|_| is_component(of));
-            let bar = error.max(least.map_or(0.0, |most| OF_COMPONENTS * most));
+            let missed = if of.dimension == Dimension::OfZeta { missed } else { 0.0 };
+            let bar = error.max(least.map_or(0.0, |most| OF_COMPONENTS * most)) + missed;
             Bar { name: of.name.clone(), dimension: of.dimension, bar, scale }
         };
         let figures = self.figures.iter().zip(errors.iter().zip(scales));

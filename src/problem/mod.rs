@@ -47,7 +47,7 @@ pub(crate) use singular::SEEN;
 pub use singular::Singular;
 pub use state::State;
 pub use supports::Supports;
-pub(crate) use unresolved::unresolved;
+pub(crate) use unresolved::{missed_mean, unresolved};
 
 use crate::{
     ROUNDING,
