@@ -288,15 +288,15 @@ def inputs(folder, binary, share):
         yield path.name, lines_of(path), path.suffix, converted, 1
     result = folder / "result"
     for path in sorted(result.glob("*")):
+        if path.suffix == ".msh":
+            continue
         readers = {"info": partial(module, "info", [result]), "table": partial(module, "table", [result]),
                    "states": partial(in_python, partial(states_of, result))}
         for name, read in readers.items():
-            if name == "states" and path.suffix != ".msh" or path.name in ("summary.json", "fields.pvd"):
+            if name == "states" or path.name in ("summary.json", "fields.pvd"):
                 yield f"{path.name} {name}", lines_of(path), f".{path.name}", partial(in_place, path, read), 1
     yield "cases.csv", CASES.split("\n"), ".csv", lambda path: in_python(partial(cases, path)), 1
     if binary:
-        (folder / "part.msh").write_bytes((ROOT / "tests/fixtures/msh/plate-22.msh").read_bytes())
-        (folder / "profile.csv").write_text(PROFILE)
         check = lambda *more: program(binary, ["check", "scene.toml", *more], folder)
         for version in ("plate-22", "plate-41", "version-1", "version-40", "quadrangles"):
             path = ROOT / f"tests/fixtures/msh/{version}.msh"
@@ -343,7 +343,6 @@ def main():
     parser.add_argument("--count", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--binary", type=Path)
-    parser.add_argument("--result", type=Path, help="a folder of results, of which a copy is mutated")
     parser.add_argument("--share", type=float, default=0.02)
     arguments = parser.parse_args()
     signal.signal(signal.SIGALRM, late)
@@ -352,9 +351,12 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.toml").write_text(SCENE)
-        if arguments.result:
-            shutil.copytree(arguments.result, folder / "result")
-        binary = arguments.binary and arguments.binary.resolve()
+        (folder / "part.msh").write_bytes((ROOT / "tests/fixtures/msh/plate-22.msh").read_bytes())
+        (folder / "profile.csv").write_text(PROFILE)
+        if binary := arguments.binary and arguments.binary.resolve():
+            _, said, failure = program(binary, ["run", "scene.toml", "--out", "result", "--set", "output.every=1"], folder)
+            if said or failure:
+                sys.exit(f"no results to mutate: {failure or said}")
         found = []
         for of, lines, suffix, read, share in inputs(folder, binary, arguments.share):
             path = folder / f"mutated{suffix}"
