@@ -36,7 +36,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run plot keys test validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run plot keys test nastran validate random compare \
     bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
@@ -51,6 +51,7 @@ help:
 	@echo 'make plot       the pictures of every run in out/, again; or ARGS="--animate --format svg"'
 	@echo 'make keys       geo/KEYS.md from the schema of scenes and the figures of the program'
 	@echo 'make test       format, lints, documentation, tests (4 minutes)'
+	@echo 'make nastran    the test of Nastran, with pyNastran in .venv-nastran'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
 	@echo 'make random     a thousand random scenes, judged by code of their own; or ARGS="--count 50 --order 2"'
 	@echo 'make compare    all contact solvers on all scenes, side by side'
@@ -134,6 +135,12 @@ test: deps-test
 	@awk '/^test result/ { passed += $$4; failed += $$6 } END { print passed + 0 " passed, " failed + 0 " failed" }' \
 	    target/tests.log; exit $$(cat target/tests.code)
 
+# pyNastran is in no package of Debian.
+nastran: deps-test
+	$(PYTHON) -m venv --system-site-packages .venv-nastran
+	.venv-nastran/bin/pip install --quiet pyNastran
+	PYTHON=$(CURDIR)/.venv-nastran/bin/python cargo test --locked --test mesh -- --ignored nastran
+
 validate: build deps-validate deps-random
 	$(PYTHON) validation/selfcheck.py
 	$(PYTHON) validation/compare.py --binary $(BINARY) validation/layers.toml $(addprefix geo/, \
@@ -193,7 +200,7 @@ handbook: build
 FUZZ_RUNS ?= 4900000
 # A scene takes twenty milliseconds.
 FUZZ_SCENES ?= $(shell expr $(FUZZ_RUNS) / 25)
-# FILES meshes, scenes, profiles and results as files; for Nastran PYTHON needs pyNastran.
+# FILES meshes, scenes, profiles and results as files; for Nastran PYTHON needs pyNastran (make nastran).
 FILES ?= 10000
 fuzz: build
 	$(PYTHON) validation/fuzz/mutate_files.py --count $(FILES) --binary $(BINARY)

@@ -19,7 +19,7 @@ import numpy as np
 
 from reading import read_frame
 from results import markdown, write_table
-from signorini_files import begins, check, whole
+from signorini_files import begins, check, check_folder, whole
 from signorini_results import load
 
 # Titles of the printed table; the others are shown in comparison.csv alone.
@@ -178,6 +178,7 @@ def main(prog=None):
     if not arguments.solvers:
         names = subprocess.run([os.environ["SIGNORINI"], "solvers"], capture_output=True, text=True)
         arguments.solvers = [line.split("\t")[0] for line in names.stdout.splitlines()]
+    check_folder(arguments.out)
     path = arguments.out / "comparison.csv"
     check(path, is_own)
     try:

@@ -1,17 +1,24 @@
 """Runs a script embedded in `signorini`: python -I -X utf8 -c EMBEDDED NAME ARGUMENT…, with the sources of all scripts and
 the template of the report as JSON on standard input. It writes no files of its own."""
 
+import signal
+
+# Ctrl-C has no effect before. Up to the main function a signal ends this process: packages turn exceptions during their import
+# into errors of their own.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+
 import importlib
 import io
 import json
 import os
 import re
-import signal
 import sys
+import unicodedata
 from importlib.abc import InspectLoader, MetaPathFinder
 from importlib.util import spec_from_loader
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+PROCESS = os.getpid()
 
 
 class Sources(MetaPathFinder, InspectLoader):
@@ -35,11 +42,19 @@ class Sources(MetaPathFinder, InspectLoader):
 
 
 class Printable(io.TextIOWrapper):
-    """Text whose control characters are shown as \\x1b: names in files of others must not command the terminal."""
+    """Text that does not command the terminal, as src/printable.rs shows it."""
 
     def write(self, text):
-        super().write(re.sub(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f]|\r(?!\n)", lambda of: f"\\x{ord(of[0]):02x}", text))
+        super().write(re.sub(r"[^ -~\n\t\r]|\r(?!\n)", shown, text))
         return len(text)
+
+
+def shown(of):
+    """A character of a regular expression: `\\x1b` for one that controls, also as a byte; `\\u{202e}` for one that is not seen."""
+    number, kind = ord(of[0]), unicodedata.category(of[0])
+    if kind == "Cc" or 0xdc80 <= number < 0xdca0:
+        return f"\\x{number & 0xff:02x}"
+    return f"\\u{{{number:x}}}" if kind in ("Cf", "Zl", "Zp") else of[0]
 
 
 def printable(stream, errors):
@@ -48,7 +63,9 @@ def printable(stream, errors):
 
 
 def stop(number, frame):
-    """Ends as Ctrl-C does, with the exit code of the signal; a second signal ends at once."""
+    """Ends as Ctrl-C does, with the exit code of the signal; a second signal ends at once. Forked processes end with this one."""
+    if os.getpid() != PROCESS:
+        return
     for again in SIGNALS:
         signal.signal(again, lambda number, frame: os._exit(128 + number))
     raise KeyboardInterrupt(128 + number)
@@ -66,16 +83,18 @@ def program(name):
 
 name = sys.argv.pop(1)
 try:
-    for number in SIGNALS:
-        # `nohup` lets SIGHUP be ignored. SIGINT is ignored up to here.
-        if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, stop)
     sys.stdout, sys.stderr = printable(sys.stdout, "surrogateescape"), printable(sys.stderr, "backslashreplace")
     sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
-    code = program(name)(f"signorini {name}")
+    main = program(name)
+    for number in SIGNALS:
+        # `nohup` lets SIGHUP be ignored.
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, stop)
+    code = main(f"signorini {name}")
     sys.stdout.flush()
 except KeyboardInterrupt as stopped:
-    code = stopped.args[0]
+    # Pictures that are being drawn are not waited for: their processes end with this one.
+    os._exit(stopped.args[0])
 except OSError as error:
     # The reader of the output may have closed the pipe; this is no error. Python writes what it still has at its end.
     code = 0 if isinstance(error, BrokenPipeError) else 2

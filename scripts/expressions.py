@@ -66,6 +66,8 @@ class Expression:
 
     def __call__(self, x, y, t, functions=NUMPY_FUNCTIONS):
         def points(name):
+            if not (self.folder / name).is_file():
+                raise ExpressionError(f"the table {name} is no file")
             rows = np.genfromtxt(self.folder / name, delimiter=",")
             return rows[~np.isnan(rows).any(axis=1)].T
 

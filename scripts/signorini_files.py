@@ -11,6 +11,12 @@ FIRST_LINE = b"# As run by signorini; the results stand beside it."
 PARTIAL = ".signorini-partial-"
 
 
+def check_folder(folder):
+    """Raises an OSError if a link stands in the place of a folder of outputs."""
+    if Path(folder).is_symlink():
+        raise OSError(None, "a link is there; name the folder that it leads to, or move the link away", str(folder))
+
+
 def is_of_run(path):
     """Whether a file is in a folder of results: the names of results there belong to the program."""
     return begins(Path(path).with_name("scene.toml"), FIRST_LINE)

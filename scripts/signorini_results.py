@@ -480,10 +480,10 @@ def derivatives(barycentric, nodes):
 
 
 def frames_of(folder):
-    """(time, file) of each frame that fields.pvd lists, in the order of time."""
+    """(time, file) of each frame that fields.pvd lists, in the order of time. They stand beside it."""
     folder = Path(folder)
     listed = ElementTree.parse(folder / "fields.pvd").findall(".//DataSet")
-    frames = [(float(of.get("timestep")), folder / of.get("file")) for of in listed]
+    frames = [(float(of.get("timestep")), folder / Path(of.get("file")).name) for of in listed]
     return sorted(frames, key=lambda frame: frame[0])
 
 
@@ -495,7 +495,7 @@ def read_frame(path):
         # meshio.read would end the program if it finds a fault.
         return meshio.vtu.read(path)
     sources = [piece.get("Source") for piece in ElementTree.parse(path).findall(".//Piece")]
-    pieces = [read_frame(path.parent / source) for source in sources]
+    pieces = [read_frame(path.parent / Path(source).name) for source in sources]
     starts = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     cells = [start + piece.cells[0].data for piece, start in zip(pieces, starts)]
     return meshio.Mesh(

@@ -2,6 +2,7 @@
 
 import difflib
 import json
+import re
 import sys
 from math import inf
 from pathlib import Path
@@ -46,8 +47,13 @@ def read_summary(path):
     def refuse(constant):
         raise ValueError(constant)
 
+    for there in path.parent.glob("*"):
+        if there.exists() and not there.is_file() and not there.is_dir():
+            raise ValueError(f"{there}: it is a pipe or a device, which may never end; move it away")
+    # Names and titles are lines.
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
+        text = re.sub(r"\\(?:(n|r|u000[adAD])|.)", lambda of: "\\" * bool(of[1]) + of[0], path.read_text(encoding="utf-8"))
+        summary = json.loads(text, parse_constant=refuse)
     except (ValueError, RecursionError):
         raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
     wrong = next((key for key, kind in KINDS.items() if not is_of({key: kind}, summary)), None)

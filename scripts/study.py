@@ -31,7 +31,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from signorini_files import check, whole
+from signorini_files import check, check_folder, whole
 from signorini_summaries import columns_of, rows_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
 
@@ -124,7 +124,7 @@ def names_for(runs):
 def inputs_of(scene):
     """The scene's file, its mesh or geometry, and its tables; those that exist."""
     scene = Path(scene)
-    text = scene.read_text(encoding="utf-8", errors="replace") if os.path.exists(scene) else ""
+    text = scene.read_text(encoding="utf-8", errors="replace") if os.path.isfile(scene) else ""
     names = re.findall(r"""["']([^"'()]+\.\w+)["']|(?:table|spline|pchip)\(["']([^"']+)["']""", text)
     files = [scene, *(scene.parent / name for pair in names for name in pair if name)]
     # A text may be too long for a name.
@@ -158,13 +158,15 @@ def outcome(folder, error):
 
 
 def is_of_study(path):
-    """Whether a file stands in the folder of a study: there is an empty file `.locks`."""
+    """Whether a file stands in the folder of a study: there is an empty file `.locks`, and the head is that of its table."""
     locks = path.with_name(".locks")
-    return locks.is_file() and not locks.is_symlink() and not locks.stat().st_size
+    return (locks.is_file() and not locks.is_symlink() and not locks.stat().st_size
+            and (path == locks or re.match(rb"run,.*\bstatus\b", path.read_bytes())))
 
 
 def own(out):
     """Makes the folder of a study; returns its file `.locks`, open."""
+    check_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     for name in (".locks", "study.csv"):
         check(out / name, is_of_study)
@@ -226,7 +228,7 @@ def run_all(out, everything, inputs, jobs, columns):
     if first:
         warn_of_columns(columns, first)
     running = set()
-    print(f"{len(everything)} runs, {done} of them complete", flush=True)
+    print(f"{len(everything)} runs{f', {done} of them complete' * bool(done)}", flush=True)
 
     def attempt(of):
         with claim(locks, of[0]) as is_free:

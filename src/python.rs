@@ -73,7 +73,7 @@ pub fn script_command(python: &OsStr, name: &str) -> io::Result<Command> {
     let mut sources = tempfile::tempfile()?;
     serde_json::to_writer(&sources, &all)?;
     sources.rewind()?;
-    // Python would answer Ctrl-C with a traceback until the script handles it: so Ctrl-C has no effect before.
+    // Python would answer Ctrl-C with a traceback until its first line: so Ctrl-C has no effect before.
     let mut command = Command::new("sh");
     command.args(["-c", "trap '' INT; exec \"$@\"", "sh"]).arg(python).args(ISOLATED);
     command.args(["-c", EMBEDDED, name]).stdin(sources);

@@ -7,6 +7,16 @@ use std::{
     path::Path,
 };
 
+/// The bytes of a file. A pipe or a device might never end; standard input is read.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let there = fs::metadata(path)?;
+    let is_input = ["/dev/stdin", "/dev/fd"].iter().any(|input| path.starts_with(input));
+    match there.is_file() || there.is_dir() || is_input {
+        true => fs::read(path),
+        false => Err(io::Error::other("it is a pipe or a device; name a file")),
+    }
+}
+
 /// The text of a file.
 ///
 /// # Errors

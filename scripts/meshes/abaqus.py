@@ -7,8 +7,8 @@ import math
 import re
 from difflib import get_close_matches
 
-from meshes.abaqus_keywords import CHANGING, HARMLESS, NOTED, READ
-from meshes.description import PLANE, Mesh, real, refuse, whole
+from meshes.abaqus_keywords import CHANGING, HARMLESS, NOTED, OF_SCENE, READ
+from meshes.description import PLANE, Mesh, real, refuse, text_of, whole
 
 # The types of faces: plane elements, with sides S1 to S4, and shells, with sides E1 to E4 in Abaqus and S3 to S6 in CalculiX.
 PLANES = re.compile(r"(?:CPEG?|CPS|CAX|DC2D|AC2D)(\d)(?!\d)")
@@ -41,7 +41,7 @@ class Block:
         words = [part.partition("=") for part in line.split(",")]
         self.place, self.name = place, "".join(words[0][0].split()).upper().lstrip("*")
         self.options = {"".join(name.split()).upper(): value.strip().strip('"') for name, _, value in words[1:] if name.strip()}
-        listed = (*READ, *NOTED, *HARMLESS)
+        listed = (*READ, *NOTED, *OF_SCENE, *HARMLESS)
         if self.name in CHANGING:
             refuse(place, f"*{self.name} may make, move or take away nodes or elements and is not read; write the whole mesh")
         if self.name not in listed:
@@ -67,7 +67,7 @@ def meant(word, known, star=""):
 def lines_of(path, folder, above=()):
     """The lines of a file and of those that it reads, each with its place. A line of a keyword goes on after a comma."""
     before = ""
-    for number, line in enumerate(path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1):
+    for number, line in enumerate(text_of(path).splitlines(), 1):
         line = before + line.strip()
         before = line if re.match(r"\*[^*].*,$", line) else ""
         if before or not line or line.startswith("**"):
@@ -98,7 +98,7 @@ class Reader:
 
     def __init__(self):
         self.assembly = self.scope = Scope("the file")
-        self.parts, self.instances, self.left_out = {}, {}, {}
+        self.parts, self.instances, self.left_out, self.of_scene = {}, {}, {}, {}
         self.by_meshio, self.block, self.words, self.rows = False, None, [], 0
 
     def members(self, kind, word, scope, place):
@@ -140,8 +140,9 @@ class Reader:
         if self.words:
             refuse(block.place, f"the lines of *{self.block.name} end within element {self.words[0]}")
         self.block, self.rows = block, 0
-        if block.name in NOTED:
-            self.left_out.setdefault(block.name, block.place)
+        for names, found in ((NOTED, self.left_out), (OF_SCENE, self.of_scene)):
+            if block.name in names:
+                found.setdefault(block.name, block.place)
         getattr(self, f"start_{block.name.lower()}", lambda block: None)(block)
 
     def leave(self, block):
@@ -305,9 +306,11 @@ def read(path, mesh):
     if reader.scope is not reader.assembly:
         refuse(place, f"the file ends within {reader.scope.title}")
     describe(reader, mesh)
-    if reader.left_out:
-        names = ", ".join(f"*{name} ({place})" for name, place in reader.left_out.items())
-        mesh.notes.append(f"{names} {'are' if len(reader.left_out) > 1 else 'is'} left out: the scene says what holds the body")
+    for found, why in ((reader.left_out, "left out: the scene says what holds the body"),
+                       (reader.of_scene, "not read: write supports, loads, contact and materials into the scene")):
+        if found:
+            names = ", ".join(f"*{name} ({place})" for name, place in found.items())
+            mesh.notes.append(f"{names} {'are' if len(found) > 1 else 'is'} {why}")
 
 
 def describe(reader, mesh):

@@ -15,6 +15,14 @@ def refuse(place, problem):
     sys.exit(f"{place}: {problem}" if place else problem)
 
 
+def text_of(path, encoding="utf-8-sig"):
+    """The text of a file."""
+    text = path.read_text(encoding=encoding, errors="replace")
+    if re.search(r"[\0-\x08]", text):
+        refuse("", f"it is a binary file; export the mesh as text, with the ending {path.suffix} only if it is in this format")
+    return text
+
+
 def whole(word):
     """The whole number in a word. Python itself reads 1_0 too."""
     if not re.fullmatch(r"[+-]?\d+", word.strip()):

@@ -4,7 +4,7 @@ import io
 import re
 import sys
 
-from meshes.description import PLANE, refuse
+from meshes.description import PLANE, refuse, text_of
 
 # Elements by the number of corners.
 FACES = {"CTRIA3": 3, "CTRIAR": 3, "CTRIA6": 3, "CQUAD4": 4, "CQUADR": 4, "CQUAD8": 4, "CQUAD": 4}
@@ -38,7 +38,7 @@ def read(path, mesh):
 
     model = BDF(debug=None)
     model._card_parser["GRID"] = (Grid, model._card_parser["GRID"][1])
-    text = path.read_text(encoding="latin-1")
+    text = text_of(path, "latin-1")
     try:
         with contextlib.redirect_stdout(sys.stderr):
             # Many programs write the bulk data alone, with or without its first line.

@@ -2,7 +2,7 @@
 
 A file is a list of datasets between lines of -1. A dataset begins with its number. A number in no list here is refused.
 """
-from meshes.description import PLANE, real, refuse, whole
+from meshes.description import PLANE, real, refuse, text_of, whole
 
 NODES, ELEMENTS, SYSTEMS = 2411, 2412, 2420
 GROUPS = (2435, 2452, 2467, 2477)
@@ -22,7 +22,7 @@ class Lines:
     """The lines of a dataset, taken one after the other."""
 
     def __init__(self, path):
-        self.name, self.lines, self.at = path.name, path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 0
+        self.name, self.lines, self.at = path.name, text_of(path).splitlines(), 0
 
     @property
     def place(self):

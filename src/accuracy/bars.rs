@@ -2,6 +2,7 @@
 
 use super::Measured;
 use crate::{
+    advice::missed_mean,
     evolution::{AIM, Outcome},
     observe::{Bar, Dimension, Figure, NEGLIGIBLE_DAMAGE, Observation, ObservedProblem, Of, Value},
     petsc::PetscError,
@@ -109,9 +110,11 @@ impl ObservedProblem {
             let most = largest.entry(&of.group).or_default();
             *most = most.max(*error);
         }
+        let missed = missed_mean(self);
         let bar = |(of, (&error, &scale)): (&Figure, (&f64, &f64))| {
             let least = largest.get(&*of.group).filter(|_| is_component(of));
-            let bar = error.max(least.map_or(0.0, |most| OF_COMPONENTS * most));
+            let missed = if of.dimension == Dimension::OfZeta { missed } else { 0.0 };
+            let bar = error.max(least.map_or(0.0, |most| OF_COMPONENTS * most)) + missed;
             Bar { name: of.name.clone(), dimension: of.dimension, bar, scale }
         };
         let figures = self.figures.iter().zip(errors.iter().zip(scales));

@@ -17,4 +17,4 @@ mod unresolved;
 pub use notes::locks;
 pub(crate) use singular::SEEN;
 pub use singular::Singular;
-pub(crate) use unresolved::unresolved;
+pub(crate) use unresolved::{missed_mean, unresolved};

@@ -75,6 +75,12 @@ pub(crate) fn unresolved(
     Ok(found)
 }
 
+/// |∫(ζ₀ − Iζ₀)|/|Ω|: the part of the mean initial damage that the nodes miss. A finer mesh of an accuracy may miss as much.
+pub(crate) fn missed_mean(problem: &DiscreteProblem) -> f64 {
+    let missed = missed_damage(problem.scene(), problem.mesh());
+    missed.map_or(0.0, |of| (of.integral - of.shown).abs() / problem.body.area)
+}
+
 /// Notes on prescribed displacements and initial damage that vary much between the nodes.
 pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
     let mut notes = Vec::new();

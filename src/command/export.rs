@@ -81,6 +81,7 @@ pub fn export(arguments: &ExportArguments) -> Result<(), Failure> {
 
 fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let ExportArguments { scene, time, out } = arguments;
+    check_is_own(&out.join("export.json"), || true).map_err(Failure::input)?;
     let earlier = earlier(out);
     let is_own = |name: &str| earlier.iter().any(|known| known == name);
     EXPORTED

@@ -23,7 +23,14 @@ pub fn run(path: &Path, materials: Option<&str>) -> Result<Vec<u8>, MeshError> {
     let said = String::from_utf8_lossy(&made.stderr);
     let last = said.trim().lines().last().unwrap_or("the conversion failed");
     if !made.status.success() {
-        return Err(MeshError::file(path, last));
+        // The script names the file and the line; this message also has the folder.
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let at = last
+            .strip_prefix(&*name)
+            .and_then(|rest| rest.strip_prefix(", line ")?.split_once(": "));
+        let (place, problem) =
+            at.map_or((String::new(), last), |(line, rest)| (format!(":{line}"), rest));
+        return Err(MeshError::File { path: path.to_owned(), place, problem: problem.to_owned() });
     }
     Ok(made.stdout)
 }

@@ -1,10 +1,11 @@
 //! A growing file that is complete at any time, even if the program is killed.
 
 use super::{OutputError, write_whole};
+use crate::whole_file;
 use std::{
-    fs::File,
+    fs::{self, File},
     io,
-    os::unix::fs::FileExt,
+    os::unix::fs::{FileExt, MetadataExt},
     path::{Path, PathBuf},
 };
 
@@ -52,6 +53,10 @@ impl GrowingFile {
 }
 
 fn open(path: &Path, length: u64) -> io::Result<File> {
+    // Another name of the file keeps its contents.
+    if fs::metadata(path)?.nlink() > 1 {
+        whole_file::write(path, &fs::read(path)?, |_| Ok(()))?;
+    }
     let file = File::options().write(true).open(path)?;
     match file.metadata()?.len() < length {
         true => Err(io::Error::other("it is shorter than when the checkpoint was written")),

@@ -49,8 +49,12 @@ impl OutputError {
 /// Creates `folder`.
 ///
 /// # Errors
-/// The folder cannot be created or written to.
+/// The folder is a link, or it cannot be created or written to.
 pub fn create(folder: &Path) -> Result<(), OutputError> {
+    if folder.is_symlink() {
+        let problem = "a link is there; name the folder that it leads to, or move the link away";
+        return Err(OutputError::new(folder, problem));
+    }
     fs::create_dir_all(folder).map_err(|e| OutputError::new(folder, e))?;
     // Only writing shows whether a folder is writable.
     tempfile::tempfile_in(folder).map_err(|e| OutputError::new(folder, e))?;
@@ -104,11 +108,13 @@ fn begins(path: &Path, start: &str) -> bool {
 /// with the name of a result. Folders of earlier runs contain their scene.
 pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     create(folder)?;
-    let is_own = fs::read_to_string(folder.join(SCENE)).is_ok_and(|text| AsRun::is_text(&text));
+    let scene = folder.join(SCENE);
+    check_is_own(&scene, || begins(&scene, AsRun::FIRST_LINE))?;
+    let is_own = scene.exists();
     for (name, path) in files(folder)? {
         if checkpoint(&name).is_some() {
             check_is_own(&path, || begins(&path, CHECKPOINT))?;
-        } else if name == SCENE || is_result(&name) {
+        } else if is_result(&name) {
             check_is_own(&path, || is_own)?;
         }
     }

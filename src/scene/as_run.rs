@@ -4,9 +4,6 @@ use super::{Scene, document::absolute};
 use crate::mesh::{self, Format};
 use std::{fs, path::PathBuf};
 
-/// The first line of the file.
-const FIRST_LINE: &str = "# As run by signorini; the results stand beside it.";
-
 /// A scene file that repeats a run: the `--set` arguments are inserted, and the mesh is the one in use.
 #[derive(Debug, Clone)]
 pub struct AsRun {
@@ -19,10 +16,8 @@ pub struct AsRun {
 }
 
 impl AsRun {
-    /// Whether a text is that of such a scene file.
-    pub fn is_text(text: &str) -> bool {
-        text.starts_with(FIRST_LINE)
-    }
+    /// The first line of the file.
+    pub const FIRST_LINE: &str = "# As run by signorini; the results stand beside it.";
 
     /// Whether a file has the name of a copy.
     pub fn is_copy(name: &str) -> bool {
@@ -66,7 +61,7 @@ impl Scene {
         let mut mesh = written.filter(|_| has_keys).unwrap_or_default();
         mesh.insert("file".into(), file.into());
         scene.insert("mesh".into(), mesh.into());
-        AsRun { text: format!("{FIRST_LINE}\n{scene}"), copies, tables }
+        AsRun { text: format!("{}\n{scene}", AsRun::FIRST_LINE), copies, tables }
     }
 }
 

@@ -219,7 +219,7 @@ impl Scene {
                            new NAME` writes one)";
             return Err(refused(problem.to_owned()));
         }
-        let text = std::fs::read(path)
+        let text = whole_file::read(path)
             .map_err(|error| refused(format!("the scene cannot be read: {error}")))?;
         let text = whole_file::text(text).map_err(refused)?;
         Self::parse(&text, path, overrides)

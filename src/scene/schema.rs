@@ -272,14 +272,15 @@ fn read_value(value: &Value, schema: &Schema, scope: &Scope) -> Result<Value, St
         Some(name) => value.as_str() == Some(name),
         None => number.is_some() && number == choice.as_f64(),
     };
-    let is_text = value.as_str().is_some_and(|text| !text.trim().is_empty());
+    let is_text =
+        value.as_str().is_some_and(|text| !text.trim().is_empty() && !text.contains(['\n', '\r']));
     let rule = schema["values"].as_str().unwrap_or("finite");
     let (wanted, holds) = match (schema["enum"].as_array(), type_of(schema), number) {
         (Some(choices), ..) => {
             let names: Vec<String> = choices.iter().map(Schema::to_string).collect();
             (names.join(" or "), choices.iter().any(is))
         }
-        (_, Some("string"), _) => ("a string that is not empty".to_owned(), is_text),
+        (_, Some("string"), _) => ("a string that is not empty, in one line".to_owned(), is_text),
         (_, Some("boolean"), _) => ("true or false".to_owned(), value.is_bool()),
         (_, Some("array"), _) if schema["maxItems"] == 2 && schema["items"]["type"] != "number" => {
             ("an array of two, expressions in quotes, like [\"2*x\", 0]".to_owned(), false)
@@ -306,7 +307,7 @@ fn read_value(value: &Value, schema: &Schema, scope: &Scope) -> Result<Value, St
         },
     };
     match number {
-        _ if !holds => Err(format!("must be {wanted}{found}")),
+        _ if !holds => Err(format!("must be {wanted}{}", found.replace(['\n', '\r'], "\\n"))),
         Some(number) if type_of(schema) == Some("integer") => Ok(Value::Integer(number as i64)),
         Some(number) => Ok(Value::Float(number)),
         None => Ok(value.clone()),

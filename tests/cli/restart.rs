@@ -46,6 +46,27 @@ fn a_killed_run_goes_on_as_if_it_had_not_been() {
     }
 }
 
+/// A file that a run continues may have another name, elsewhere: what stands under that name stays.
+#[test]
+fn another_name_of_a_file_that_goes_on() {
+    let (directory, arguments) = (TestDirectory::new(), [&LONG[..], &OFTEN].concat());
+    let mut run = started(&directory, "killed", &arguments);
+    wait_until(&mut run, "a checkpoint", || directory.has_checkpoint("killed", 60));
+    run.kill().expect("it lives");
+    run.wait().expect("it ends");
+    let names = ["history.csv", "contact.csv", "fields.pvd"].map(|name| format!("killed/{name}"));
+    let texts = names.each_ref().map(|name| {
+        let other = directory.path(&name.replace("killed/", "other-"));
+        fs::hard_link(directory.path(name), other).expect("a link");
+        directory.read(name)
+    });
+    directory.run(&[&arguments[..], &["--out", "killed", "--restart"]].concat());
+    for (name, text) in names.iter().zip(texts) {
+        assert_eq!(directory.read(&name.replace("killed/", "other-")), text, "{name}");
+        assert!(directory.read(name).len() > text.len(), "{name} has grown");
+    }
+}
+
 /// Homogeneous bars whose first time steps are too long for the accuracy. The first one reaches its end, the second one stops
 /// at ζ_* by the error of the steps, and the third one stops in both runs.
 #[test]

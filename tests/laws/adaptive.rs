@@ -189,12 +189,7 @@ fn initial_damage_that_the_first_triangles_miss_counts_by_what_is_left_of_it() {
         let triangles = mesh.triangles.len();
         let found = 1.0 - solved(scene, mesh).last.record.zeta_mean;
         println!("{initial}: mesh {rounds}, {triangles} triangles, {found} ± {bar}, {exact}");
-        // Nodes show the width of a strip only roughly, on all meshes.
-        let is_strip = initial.contains("abs");
-        assert!(
-            is_strip || (found - exact).abs() <= bar,
-            "{initial}: {found} ± {bar} is not {exact}"
-        );
+        assert!((found - exact).abs() <= bar, "{initial}: {found} ± {bar} is not {exact}");
         assert!((found - exact).abs() <= 0.03 * exact, "{initial}: {found} is not {exact}");
     }
 }

@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,6 +50,7 @@ name = "top"
 traction = ["0", "-80*t"]
 """
 PROFILE = "x,y\n-1,0.2\n0,0.1\n1,0.1\n2,0.3\n3,0.5\n"
+CASES = "label,material.young,time.end\na,1e5,1\nb,,2\n\"c,d\",3e5,\n"
 WORDS = ["0", "-1", "1e999", "nan", "99999999999999999999", "", "x", "1.D+0", "\0", "é", "-0", "1e-320", "*", "$", "{", "\t"]
 
 
@@ -284,14 +286,17 @@ def inputs(folder, binary, share):
 
     for path in sorted(SEEDS.iterdir()):
         yield path.name, lines_of(path), path.suffix, converted, 1
-    for name in ("info", "table"):
-        for file in ("summary.json", "history.csv", "fields.pvd"):
-            result = folder / "result"
-            if (result / file).exists():
-                yield f"{file} {name}", lines_of(result / file), "." + file, lambda path, name=name: result_of(name, result, path), 1
+    result = folder / "result"
+    for path in sorted(result.glob("*")):
+        if path.suffix == ".msh":
+            continue
+        readers = {"info": partial(module, "info", [result]), "table": partial(module, "table", [result]),
+                   "states": partial(in_python, partial(states_of, result))}
+        for name, read in readers.items():
+            if name == "states" or path.name in ("summary.json", "fields.pvd"):
+                yield f"{path.name} {name}", lines_of(path), f".{path.name}", partial(in_place, path, read), 1
+    yield "cases.csv", CASES.split("\n"), ".csv", lambda path: in_python(partial(cases, path)), 1
     if binary:
-        (folder / "part.msh").write_bytes((ROOT / "tests/fixtures/msh/plate-22.msh").read_bytes())
-        (folder / "profile.csv").write_text(PROFILE)
         check = lambda *more: program(binary, ["check", "scene.toml", *more], folder)
         for version in ("plate-22", "plate-41", "version-1", "version-40", "quadrangles"):
             path = ROOT / f"tests/fixtures/msh/{version}.msh"
@@ -301,15 +306,36 @@ def inputs(folder, binary, share):
             binary, ["check", "scene.toml", "--set", f"boundary.bottom.gap=spline('{path.name}', x)"], folder), share
 
 
-def result_of(name, result, path):
-    """What a script says of a folder of results in which one file is replaced."""
-    file = path.suffixes[-2][1:] + path.suffixes[-1] if len(path.suffixes) > 1 else path.name
-    kept = (result / file).read_bytes()
+def in_place(file, read, path):
+    """What a reader says of a folder of results in which one file is replaced."""
+    kept = file.read_bytes()
     try:
-        shutil.copy(path, result / file)
-        return module(name, [result])
+        shutil.copy(path, file)
+        return read()
     finally:
-        (result / file).write_bytes(kept)
+        file.write_bytes(kept)
+
+
+def states_of(result):
+    """Prints what pictures show; returns the exit code."""
+    reading, results = map(importlib.import_module, ("reading", "results"))
+    for read in (reading._contact_rows, reading._orders):
+        read.cache_clear()
+    with results.telling(result) as problems:
+        found = reading.read_results(result)
+        for state in reading.states(found, found.frames):
+            print(found.title, found.ending, state.moment, state.displacement.sum(), state.von_mises.sum(), state.zeta.sum(),
+                  *(curve.pressure.sum() for curve in state.curves))
+    return 2 if problems else 0
+
+
+def cases(path):
+    """Prints the runs of a study; returns the exit code."""
+    try:
+        print(importlib.import_module("study").cases_of(path))
+    except argparse.ArgumentTypeError as error:
+        print(error, file=sys.stderr)
+        return 2
 
 
 def main():
@@ -317,7 +343,6 @@ def main():
     parser.add_argument("--count", type=int, default=10000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--binary", type=Path)
-    parser.add_argument("--result", type=Path, help="a folder of results, of which a copy is mutated")
     parser.add_argument("--share", type=float, default=0.02)
     arguments = parser.parse_args()
     signal.signal(signal.SIGALRM, late)
@@ -326,9 +351,12 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.toml").write_text(SCENE)
-        if arguments.result:
-            shutil.copytree(arguments.result, folder / "result")
-        binary = arguments.binary and arguments.binary.resolve()
+        (folder / "part.msh").write_bytes((ROOT / "tests/fixtures/msh/plate-22.msh").read_bytes())
+        (folder / "profile.csv").write_text(PROFILE)
+        if binary := arguments.binary and arguments.binary.resolve():
+            _, said, failure = program(binary, ["run", "scene.toml", "--out", "result", "--set", "output.every=1"], folder)
+            if said or failure:
+                sys.exit(f"no results to mutate: {failure or said}")
         found = []
         for of, lines, suffix, read, share in inputs(folder, binary, arguments.share):
             path = folder / f"mutated{suffix}"

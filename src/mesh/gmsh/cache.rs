@@ -5,6 +5,7 @@
 //! inputs, and gmsh is the same program or missing. A file is replaced only if the third digest is
 //! right: then this program wrote it, and nobody has changed it.
 
+use crate::whole_file;
 use sha2::{Digest, Sha256};
 use std::{
     env,
@@ -38,7 +39,7 @@ impl Inputs {
         let files = vec![fs::canonicalize(geo)?];
         let mut inputs = Self { files, contents: Vec::new(), are_all: true };
         while let Some(file) = inputs.files.get(inputs.contents.len()).cloned() {
-            let bytes = fs::read(&file)?;
+            let bytes = whole_file::read(&file)?;
             let text = String::from_utf8_lossy(&bytes);
             // gmsh also runs the options beside a file.
             let options = fs::canonicalize(format!("{}.opt", file.display()));

@@ -16,7 +16,7 @@ use cache::Inputs;
 use std::{
     collections::BTreeMap,
     ffi::OsString,
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -135,7 +135,7 @@ fn kept(
     };
     let inputs = Inputs::read(geo).map_err(MeshError::io(geo))?;
     let digest = inputs.digest(&arguments, &last);
-    let cached = fs::read(&path);
+    let cached = whole_file::read(&path);
     let gmsh = cache::program();
     let origin = cached.as_ref().ok().and_then(|file| cache::origin(file));
     if let (Ok(file), Some([made_from, made_by])) = (&cached, origin)
@@ -184,7 +184,7 @@ pub fn scaling_factor(geo: &Path) -> Result<f64, MeshError> {
 }
 
 fn read_text(path: &Path) -> io::Result<String> {
-    fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
+    whole_file::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// The reason why gmsh would misread or silently ignore a parameter of the .geo file `text`.

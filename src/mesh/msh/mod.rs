@@ -13,9 +13,10 @@ mod v4;
 mod write;
 
 use super::{Mesh, MeshError};
+use crate::whole_file;
 use byte_reader::{ByteReader, Encoding, Result, Section, error_at, expected, not_a_mesh};
 use contents::Contents;
-use std::{collections::BTreeMap, fs, path::Path};
+use std::{collections::BTreeMap, path::Path};
 
 /// Reads a `.msh` file.
 ///
@@ -26,7 +27,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 /// # Errors
 /// The file cannot be read, or it is not the mesh of a plane body. The message names the place.
 pub fn read(path: &Path) -> std::result::Result<Mesh, MeshError> {
-    let bytes = fs::read(path).map_err(MeshError::io(path))?;
+    let bytes = whole_file::read(path).map_err(MeshError::io(path))?;
     // Some editors begin a text with a byte order mark.
     parse(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes), path)
 }

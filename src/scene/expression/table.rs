@@ -36,11 +36,7 @@ impl Table {
         if absolute(path).to_str().is_none() {
             return Err(failed(&"the name of a folder is not in UTF-8; rename the folder"));
         }
-        // Reading a device might never end.
-        if path.exists() && !path.is_file() {
-            return Err(failed(&"is no file"));
-        }
-        let bytes = std::fs::read(path).map_err(|error| failed(&error))?;
+        let bytes = whole_file::read(path).map_err(|error| failed(&error))?;
         let text = whole_file::text(bytes).map_err(|problem| failed(&problem))?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
