@@ -55,7 +55,9 @@ def absent():
         text = re.sub(r"```.*?```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
         links = {(word, False) for word in re.findall(r"\]\(([^)#:]+)\)", text)}
         for word, is_word in sorted(links | {(word, True) for word in re.findall(r"`([\w./:]+)`", text)}):
-            is_name = is_word and "/" not in word and all(name in names for name in re.findall(r"\w+", word))
+            is_file = word.endswith((".rs", ".py"))
+            known = {path.name for path in code} if is_file else names
+            is_name = is_word and "/" not in word and all(name in known for name in re.findall(r"[\w.]+" if is_file else r"\w+", word))
             if not is_name and "NAME" not in word and not any((ROOT / folder / word).exists() for folder in FOLDERS):
                 yield f"error: {page}: `{word}` does not exist"
 

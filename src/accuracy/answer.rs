@@ -42,7 +42,7 @@ pub(super) struct History {
     /// max_t ‖u‖², N m per metre of thickness, and the maximum |u| at any time, m.
     energy: f64,
     pub(super) displacement: f64,
-    /// ‖ε* − ε(u)‖²_T, their sum and ‖u‖² at the last time.
+    /// At the last time, with the recovered strains ε*: ‖ε* − ε(u)‖²_T per triangle, their sum, and ‖u‖².
     end: (Vec<f64>, f64, f64),
     /// The maximum penetration at an edge of each triangle at any time, m.
     pub(super) depths: Vec<f64>,
@@ -159,7 +159,7 @@ pub(super) struct Answer {
     pub(super) zeta: Vec<f64>,
     /// The times at which steps end, s.
     pub(super) times: Vec<f64>,
-    /// η.
+    /// The estimated relative error of u in the energy norm, η of [`Sequence`](super::sequence).
     pub(super) error: f64,
     /// The figures at the end.
     pub(super) values: Vec<f64>,

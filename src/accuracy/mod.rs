@@ -4,7 +4,7 @@
 //!
 //! - SOLVE: a run with few time steps on the mesh (`FewStepRun`), which leaves an `Answer`.
 //! - ESTIMATE: the error of u per triangle, m_T = max_t ‖ε* − ε(u(t))‖²_T / max_t ‖u(t)‖² (at the end relative to ‖u‖² there), with
-//!   the recovered strains ε* (`Estimate`). An estimate misses details finer than the mesh. So a `Measurement` follows once
+//!   the recovered strains ε* (`RecoveredStrains`). An estimate misses details finer than the mesh. So a `Measurement` follows once
 //!   the estimates are small: the same steps on the mesh bisected everywhere. The sequence of answers gives the error bars
 //!   of the figures (`Sequence`).
 //! - MARK: the factors for the sizes of the triangles (`marking`, `sizes`).

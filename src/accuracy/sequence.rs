@@ -6,7 +6,8 @@
 //! 1.5 (max(|F_n − F_m|, |F_{m−1} − F_m|, min_{i<n} ρ_i |F_i − F_m|) + |F_m − F_{m−1}| r/(1 − r)),
 //! r = η_m/η_{m−1},   ρ_i = min(1, (η_n/η_i)²).
 //!
-//! If the finest mesh is that of a measurement before, then the mesh m − 1 that was bisected to it comes before the mesh n.
+//! The answer on the finest mesh may be kept from the measurement before. Then F_{m−1} is the figure on the mesh that was bisected for that
+//! measurement, which is older than the mesh n.
 //!
 //! The last term is the sum of all further changes if they fall like η. The error of a figure is a product of two errors in
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.

@@ -41,7 +41,8 @@ const LAMBDA: [f64; 3] = [0.03, 0.975, 1.5];
 /// Number of parts of each side of this rectangle.
 const PARTS_OF_SIDE: usize = 48;
 /// Are stresses singular where sectors (stiffness and angle, rad) meet, with conditions on two sides, or inside the body?
-/// Along half the border of the rectangle the argument of the determinant changes by π times the number of its roots.
+/// The determinant is real on the real axis. So along the half of the rectangle's border above this axis its argument changes by π times
+/// the number of its roots inside (argument principle).
 fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2]>) -> bool {
     let unit: f64 = sectors.iter().map(|(stiffness, _)| stiffness[(2, 2)]).sum();
     let determinant = |l: Complex<f64>| {

@@ -30,7 +30,8 @@ const MAX_ADDED: f64 = 100_000.0;
 /// order. The maximum |u| is `displacement`, m. There are two kinds:
 ///
 /// - edges on which |u_D − Iu_D| exceeds `accuracy` · `displacement`, with Iu_D the nodal interpolation of u_D;
-/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². The part q of ‖ζ₀ − Iζ₀‖² is left at the end. The
+/// - the longest sides of the triangles with the largest ‖ζ₀ − Iζ₀‖_T in L². Diffusion smooths
+///   what the nodes miss: the part q of ‖ζ₀ − Iζ₀‖² is left at the end. The
 ///   other triangles have q Σ ‖ζ₀ − Iζ₀‖²_T ≤ (½ `accuracy` ‖1 − ζ‖)².
 ///
 /// Collective.
@@ -75,7 +76,8 @@ pub(crate) fn unresolved(
     Ok(found)
 }
 
-/// |∫(ζ₀ − Iζ₀)|/|Ω|: the part of the mean initial damage that the nodes miss. A finer mesh of an accuracy may miss as much.
+/// |∫(ζ₀ − Iζ₀)|/|Ω|: the part of the mean initial damage that the nodes miss. The mesh that was bisected to measure the bars may
+/// miss as much, so that their comparison does not show it.
 pub(crate) fn missed_mean(problem: &DiscreteProblem) -> f64 {
     let missed = missed_damage(problem.scene(), problem.mesh());
     missed.map_or(0.0, |of| (of.integral - of.shown).abs() / problem.body.area)

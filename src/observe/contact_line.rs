@@ -46,8 +46,8 @@ pub struct ContactLine {
 /// A line node, and its part of the length of a face, m.
 type Place = (usize, f64);
 
-/// The share of a line node in the reaction of a contact point: its factors of the force F and of the pressure F/∫φ, and its gap beyond
-/// the least one there, m.
+/// The share of a line node in the reaction of a contact point with the force F: which part of F it gets, which multiple of the mean
+/// pressure F/∫φ, and how much wider its gap is than the least gap at the point, m.
 pub(super) struct ReactionShare {
     pub(super) line_node: usize,
     pub(super) force: f64,
@@ -252,7 +252,7 @@ impl ContactLine {
     /// in `all` reactions.
     fn moved<'a>(&'a self, all: &'a [Reaction]) -> impl Iterator<Item = ([usize; 2], f64)> + 'a {
         let place = |k: usize| all.binary_search_by(|of| of[0].total_cmp(&(k as f64))).ok();
-        // Another interface node does not know its pressures yet.
+        // The force of another interface node is not divided yet, so no pressure is extrapolated from it.
         let is_interface =
             |line_node: &usize| self.interface_nodes.as_flattened().contains(line_node);
         let extrapolated = move |line_node: usize, direction: isize| {

@@ -1,4 +1,4 @@
-//! The mean displacement of each boundary with a table, and the travel of its foundation.
+//! The mean displacement of each boundary of the scene, and the travel of its foundation.
 
 use super::ObservedProblem;
 use crate::{
@@ -9,7 +9,7 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// Per boundary with a table: its nodes on this rank, with their tributary lengths ∫φ_i, m.
+/// Per boundary of the scene: its nodes on this rank, with their tributary lengths ∫φ_i, m.
 #[derive(Debug)]
 pub(super) struct Means(Vec<BTreeMap<usize, f64>>);
 

@@ -200,12 +200,12 @@ impl Supports {
         let parts: Vec<_> = numbers.into_iter().map(part).collect();
         let weights: Matrix2<f64> = parts.iter().map(|(.., weight)| weight).sum();
         let rest = force - parts.iter().map(|(_, own, _)| own).sum::<Vector2<f64>>();
-        // A negative tolerance would be an error.
+        // The square makes the tolerance positive, as nalgebra demands.
         let inverse = weights.pseudo_inverse(SINE * SINE * weights.trace()).unwrap_or_default();
         let rest = inverse * rest;
         let exerted = parts.iter().map(|(number, own, weight)| (*number, own + weight * rest));
         let mut exerted: Vec<_> = exerted.collect();
-        // Rounding across all directions.
+        // What is left lies across all supported directions, so it is rounding: the first boundary takes it.
         let all = exerted.iter().map(|(_, own)| own).sum::<Vector2<f64>>();
         exerted[0].1 += force - all;
         exerted

@@ -65,7 +65,8 @@ pub(super) struct StepState {
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: SourceLoad,
     load_change: DVector<f64>,
-    /// The error of ζ̃ from the steps so far, and the sum of the moduli of their doubts. Both grow with the damage and, for
+    /// The error of ζ̃ from the steps so far, and the sum of the moduli of their doubts: by how much the estimated error of a step
+    /// may itself be wrong. Both grow with the damage and, for
     /// two-step differences, they diffuse.
     error: DVector<f64>,
     doubt: DVector<f64>,

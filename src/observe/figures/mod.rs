@@ -1,6 +1,6 @@
 //! The figures of a run: every number that it prints with a name, a label, a unit and a place.
 //!
-//! One list, made once per problem: of the whole body, of each of several materials, of each boundary with a table, and of
+//! One list, made once per problem: of the whole body, of each of several materials, of each boundary of the scene, and of
 //! each probe. The columns of `history.csv`, the entries of `summary.json`, the closing lines, the error bars, the names of
 //! `accuracy_of` and the reports follow from it. A new figure is one more [`Figure`] in [`Figures::new`].
 
@@ -80,7 +80,7 @@ pub enum Of {
     Body,
     /// One of several materials, by its name.
     Material(String),
-    /// A boundary with a table, by its name.
+    /// A boundary of the scene, by its name.
     Boundary(String),
     /// A probe, by its name.
     Probe(String),
@@ -153,7 +153,7 @@ impl Figure {
     }
 }
 
-/// A boundary with a table.
+/// A boundary of the scene.
 struct PartOfBoundary<'a> {
     name: &'a str,
     /// Its number among the supports, and among the foundations.

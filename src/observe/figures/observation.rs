@@ -29,7 +29,7 @@ pub(crate) struct Observation {
     pub contact: Vec<ContactFigures>,
     /// Per support: F_x, F_y, N per metre of thickness, and the moment about the origin, N.
     pub resultants: Vec<[f64; 3]>,
-    /// Per boundary with a table: its mean displacement, and the travel of its foundation, m.
+    /// Per boundary of the scene: its mean displacement, and the travel of its foundation, m.
     pub means: Vec<[f64; 3]>,
     /// Per probe: u_x, u_y, m, ζ, σ_xx, σ_yy, σ_xy and the von Mises stress, Pa.
     pub probes: Vec<[f64; 7]>,
