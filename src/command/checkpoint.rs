@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use signorini::{
     accuracy::LoopState,
     evolution::RunState,
-    output::{self, FieldsWritten, OutputError},
+    output::{self, FieldsWritten, OutputError, Written},
     petsc::Communicator,
     scene::AsRun,
 };
@@ -37,8 +37,8 @@ pub struct Checkpoint {
 #[derive(Serialize, Deserialize)]
 pub struct Recorded {
     pub fields: FieldsWritten,
-    /// The length of `history.csv`, bytes.
-    pub history: Option<u64>,
+    /// What stands in `history.csv`.
+    pub history: Option<Written>,
 }
 
 /// Hashes of everything on which the results depend; see [`DIFFERENCES`].

@@ -63,8 +63,8 @@ impl<'a> Recorder<'a> {
         &mut self,
         Checkpoint { recorded, run, .. }: &Checkpoint,
     ) -> Result<(), OutputError> {
-        self.fields.resume(&recorded.fields);
-        self.history.resume(recorded.history);
+        self.fields.resume(&recorded.fields)?;
+        self.history.resume(recorded.history)?;
         self.last = Some(run.last().clone());
         if self.progress.is_none() {
             return Ok(());
@@ -72,7 +72,7 @@ impl<'a> Recorder<'a> {
         let record = &run.last().record;
         let from = format!("from step {}, t = {}", record.step, rounded(record.time));
         say(&screen::row("restart", from));
-        output::remove_partial(&self.task.folder)
+        output::remove_outdated(&self.task.folder)
     }
 
     /// Removes the results of an earlier run and writes the scene of this one.
@@ -209,7 +209,7 @@ impl Observer for Recorder<'_> {
 
     fn keep(&mut self, state: RunState) -> Observed {
         self.fields.complete()?;
-        let (fields, history) = (self.fields.written(), self.history.length());
+        let (fields, history) = (self.fields.written(), self.history.written());
         checkpoint::write(self.task, Recorded { fields, history }, state)?;
         self.saved = Instant::now();
         Ok(())

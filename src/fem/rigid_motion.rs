@@ -94,8 +94,9 @@ pub fn resultant(body: &Body, force: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
     sums
 }
 
-/// Components that move the body less than this, relative, do not count.
-const NEGLIGIBLE_MOTION: f64 = 1e-6;
+/// Components that move the body less than this, relative, do not count: a rotation about a point 1e4 times the body's
+/// radius away is a translation to the eye.
+const NEGLIGIBLE_MOTION: f64 = 1e-4;
 
 impl fmt::Display for RigidMotion {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

@@ -2,6 +2,7 @@
 
 use super::{OutputError, write_whole};
 use crate::whole_file;
+use serde::{Deserialize, Serialize};
 use std::{
     fs::{self, File},
     io,
@@ -16,38 +17,68 @@ pub(super) struct GrowingFile {
     pub(super) path: PathBuf,
     beginning: String,
     ending: &'static str,
-    /// The number of bytes before the ending; `None` before the file exists. A restart sets the number of its
-    /// checkpoint.
-    pub(super) length: Option<u64>,
+    /// What stands before the ending; `None` before the file exists.
+    pub(super) written: Option<Written>,
+}
+
+/// What stands in a file before its ending, for a checkpoint.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Written {
+    /// The number of bytes.
+    length: u64,
+    /// Their CRC-32.
+    checksum: u32,
+}
+
+impl Written {
+    fn and(self, piece: &[u8]) -> Self {
+        let mut hasher = crc32fast::Hasher::new_with_initial(self.checksum);
+        hasher.update(piece);
+        Self { length: self.length + piece.len() as u64, checksum: hasher.finalize() }
+    }
 }
 
 impl GrowingFile {
     pub(super) fn new(path: PathBuf, beginning: String, ending: &'static str) -> Self {
-        Self { path, beginning, ending, length: None }
+        Self { path, beginning, ending, written: None }
+    }
+
+    /// Continues after what was `written` at a checkpoint.
+    ///
+    /// # Errors
+    /// The file does not begin with it.
+    pub(super) fn resume(&mut self, written: Option<Written>) -> Result<(), OutputError> {
+        self.written = written;
+        let Some(written) = written else { return Ok(()) };
+        let there = fs::read(&self.path).map_err(|error| OutputError::new(&self.path, error))?;
+        let before = there.get(..written.length as usize);
+        let is_same = before.is_some_and(|text| Written::default().and(text) == written);
+        let problem = "it was changed after the checkpoint; restore it, or run without --restart";
+        is_same.then_some(()).ok_or_else(|| OutputError::new(&self.path, problem))
     }
 
     /// Adds a piece.
     pub(super) fn add(&mut self, piece: &[u8]) -> Result<(), OutputError> {
-        let length = match self.length {
-            Some(length) => length,
+        let before = match self.written {
+            Some(before) => before,
             None => {
                 write_whole(&self.path, [&self.beginning, self.ending].concat().as_bytes())?;
-                self.beginning.len() as u64
+                Written::default().and(self.beginning.as_bytes())
             }
         };
         let failed = |error: io::Error| OutputError::new(&self.path, error);
-        let file = open(&self.path, length).map_err(failed)?;
+        let file = open(&self.path, before.length).map_err(failed)?;
         let text = [piece, self.ending.as_bytes()].concat();
-        let written = file.write_all_at(&text, length);
+        let taken = file.write_all_at(&text, before.length);
         // A full disk may take a part of the piece. Then the old ending is written again.
-        let length = length + if written.is_ok() { piece.len() as u64 } else { 0 };
-        let restored = match &written {
+        let after = if taken.is_ok() { before.and(piece) } else { before };
+        let restored = match &taken {
             Ok(()) => Ok(()),
-            Err(_) => file.write_all_at(self.ending.as_bytes(), length),
+            Err(_) => file.write_all_at(self.ending.as_bytes(), after.length),
         };
-        let ended = restored.and_then(|()| file.set_len(length + self.ending.len() as u64));
-        written.and(ended).map_err(failed)?;
-        self.length = Some(length);
+        let ended = restored.and_then(|()| file.set_len(after.length + self.ending.len() as u64));
+        taken.and(ended).map_err(failed)?;
+        self.written = Some(after);
         Ok(())
     }
 }
@@ -59,7 +90,7 @@ fn open(path: &Path, length: u64) -> io::Result<File> {
     }
     let file = File::options().write(true).open(path)?;
     match file.metadata()?.len() < length {
-        true => Err(io::Error::other("it is shorter than when the checkpoint was written")),
+        true => Err(io::Error::other("another program has cut it")),
         false => Ok(file),
     }
 }

@@ -22,6 +22,7 @@ use crate::{
     whole_file::{self, PARTIAL},
 };
 use growing_file::GrowingFile;
+pub use growing_file::Written;
 use serde::Serialize;
 use std::{
     fs::{self, File, TryLockError},
@@ -129,27 +130,42 @@ pub fn lock(folder: &Path) -> Result<Option<File>, OutputError> {
     }
 }
 
-/// The files of a run and its report besides frames and pictures.
-const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json report.html report.pdf \
-     open_in_paraview.py";
+/// The files of a run besides frames, and what is made from them besides pictures.
+const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json";
+const MADE: &str = "report.html report.pdf open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
      force-displacement-together mesh pressure principal-stresses setting stress stress-damage";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
-/// Whether `name` is the name of a result or a figure: frames are `fields_NNNN[_R].[p]vtu` and
-/// `contact_NNNN.vtu`, pictures `NAME[_tTIME].png`.
-fn is_result(name: &str) -> bool {
+/// The name of a file without its ending, in two parts at the first `_`; and the ending.
+fn parts(name: &str) -> [&str; 3] {
     let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
     let (kind, rest) = stem.split_once('_').unwrap_or((stem, ""));
+    [kind, rest, ending]
+}
+
+/// Whether `name` is the name of a result or of what is made from results: frames are `fields_NNNN[_R].[p]vtu` and
+/// `contact_NNNN.vtu`.
+fn is_result(name: &str) -> bool {
+    let [kind, rest, ending] = parts(name);
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     match ending {
         _ if AsRun::is_copy(name) || FILES.split(' ').any(|known| known == name) => true,
-        "csv" | "png" | "svg" | "pdf" if kind == CURVES => true,
         "vtu" | "pvtu" => ["fields", "contact"].contains(&kind) && rest.split('_').all(is_number),
+        _ => is_made(name),
+    }
+}
+
+/// Whether `name` is the name of a report, a curve or a picture, which is `NAME[_tTIME].png`.
+fn is_made(name: &str) -> bool {
+    let [kind, rest, ending] = parts(name);
+    match ending {
+        _ if MADE.split(' ').any(|known| known == name) => true,
+        "csv" | "png" | "svg" | "pdf" if kind == CURVES => true,
         "png" | "svg" | "pdf" | "gif" | "mp4" => {
             PICTURES.split(' ').any(|known| known == kind)
-                && (stem == kind || rest.starts_with('t'))
+                && (rest.is_empty() || rest.starts_with('t'))
         }
         _ => false,
     }
@@ -217,12 +233,12 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Removes the incomplete files of a killed run from `folder`.
+/// Removes the incomplete files of a killed run from `folder`, and the pictures and reports that show it as it was.
 ///
 /// # Errors
 /// A file cannot be removed.
-pub fn remove_partial(folder: &Path) -> Result<(), OutputError> {
-    remove(folder, is_partial)
+pub fn remove_outdated(folder: &Path) -> Result<(), OutputError> {
+    remove(folder, |name| is_partial(name) || is_made(name))
 }
 
 fn is_partial(name: &str) -> bool {
@@ -269,14 +285,17 @@ impl Table {
         Ok(Self(GrowingFile::new(path, String::from_utf8_lossy(&header).into_owned(), "")))
     }
 
-    /// The number of bytes of the file; `None` before the file exists.
-    pub fn length(&self) -> Option<u64> {
-        self.0.length
+    /// What the file holds, for a checkpoint; `None` before the file exists.
+    pub fn written(&self) -> Option<Written> {
+        self.0.written
     }
 
-    /// Continues the existing file after `length` bytes.
-    pub fn resume(&mut self, length: Option<u64>) {
-        self.0.length = length;
+    /// Continues the existing file after what was `written` at a checkpoint.
+    ///
+    /// # Errors
+    /// The file was changed since.
+    pub fn resume(&mut self, written: Option<Written>) -> Result<(), OutputError> {
+        self.0.resume(written)
     }
 
     /// Appends rows.

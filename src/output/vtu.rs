@@ -4,7 +4,7 @@ use super::{
     OutputError,
     contact::ContactWriter,
     digits,
-    growing_file::GrowingFile,
+    growing_file::{GrowingFile, Written},
     vtk::{DataArray, INTEGER, REAL, SINGLE, cells_text, entry, list_of_frames, vtk_file},
     write_whole,
 };
@@ -59,8 +59,8 @@ pub struct FieldWriter {
 pub struct FieldsWritten {
     frames: usize,
     last_time: Option<f64>,
-    /// The lengths of `fields.pvd`, `contact.pvd` and `contact.csv`, bytes.
-    lengths: [Option<u64>; 3],
+    /// What stands in `fields.pvd`, `contact.pvd` and `contact.csv`.
+    files: [Option<Written>; 3],
 }
 
 impl FieldWriter {
@@ -92,15 +92,19 @@ impl FieldWriter {
 
     /// The state of the files for a checkpoint. Call [`Self::complete`] first.
     pub fn written(&self) -> FieldsWritten {
-        let lengths = [self.list.length, self.contact.list.length, self.contact.table.0.length];
-        FieldsWritten { frames: self.frames, last_time: self.last_time, lengths }
+        let files = [&self.list, &self.contact.list, &self.contact.table.0];
+        let files = files.map(|file| file.written);
+        FieldsWritten { frames: self.frames, last_time: self.last_time, files }
     }
 
     /// Continues after the frames of a checkpoint.
-    pub fn resume(&mut self, written: &FieldsWritten) {
+    ///
+    /// # Errors
+    /// A file was changed since.
+    pub fn resume(&mut self, written: &FieldsWritten) -> Result<(), OutputError> {
         (self.frames, self.last_time) = (written.frames, written.last_time);
         let files = [&mut self.list, &mut self.contact.list, &mut self.contact.table.0];
-        files.into_iter().zip(written.lengths).for_each(|(file, length)| file.length = length);
+        files.into_iter().zip(written.files).try_for_each(|(file, written)| file.resume(written))
     }
 
     /// Time of the last frame, s.

@@ -148,8 +148,18 @@ impl SceneText {
     /// The problem of a key at `position` that the file has above already, perhaps in another form.
     fn given_twice(&self, position: &Range<usize>) -> String {
         let key = self.file.get(position.clone()).unwrap_or_default();
-        match LISTS.contains(&key) {
-            true => format!("{key} is a list, each begins with [[{key}]]"),
+        let is_closed = |line: &str| {
+            let value = line.trim_start().strip_prefix(key).map(str::trim_start);
+            value
+                .and_then(|value| value.strip_prefix('='))
+                .is_some_and(|v| v.trim_start().starts_with('{'))
+        };
+        match self.file.lines().any(is_closed) {
+            _ if LISTS.contains(&key) => format!("{key} is a list, each begins with [[{key}]]"),
+            true => format!(
+                "{key} is given above in braces, which close it: write [{key}] there with a line per key, or put these \
+                 keys into the braces"
+            ),
             false => format!(
                 "{key} is given above already; keep one, merge two tables, or give a surface another name"
             ),

@@ -241,8 +241,8 @@ impl<'t> Diagnostics<'t> {
 
 /// The key of an element of an array: by its name, else by its index.
 fn key_of_element(key: &str, i: usize, name: Option<&str>) -> String {
-    match name {
-        None | Some("") => format!("{key}[{i}]"),
+    match name.filter(|name| !name.is_empty() && !name.contains(char::is_control)) {
+        None => format!("{key}[{i}]"),
         Some(name) => below(key, name),
     }
 }

@@ -138,12 +138,15 @@ fn a_geometry_that_is_a_script() {
         "e.bdf", "e.xdmf", "e.med",
     ];
     for name in names {
-        for before in [
+        let beginnings = [
             "",
             "$Comments\n$EndComments\n",
             "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n",
             "$PostFormat\n",
-        ] {
+        ];
+        // The contents decide about each reader once; the case of an ending about none.
+        let is_small = !name.contains(char::is_uppercase);
+        for before in beginnings.into_iter().take(if is_small { 4 } else { 1 }) {
             directory.write(name, &format!("{before}{script}"));
             directory.write(&format!("{name}.opt"), &script);
             let said = directory.say(&["check", "scene.toml", "--mesh", name]);
@@ -198,8 +201,8 @@ fn links_in_a_folder_of_results() {
     if directory.say_python(&["info", "out/scene"]).is_none() {
         return;
     }
-    let pictures = "setting.png deformed.png stress-damage.png principal-stresses.png pressure.png damage-history.png \
-                    force-displacement.png";
+    // The first and the last picture: one writer makes all.
+    let pictures = "setting.png force-displacement.png";
     let writers: [(&[&str], &str); 7] = [
         (&["plot", "out/scene"], pictures),
         (&["plot", "out/scene", "--animate"], "damage.gif pressure.gif"),
@@ -641,7 +644,7 @@ fn a_signal_while_python_starts() {
         return;
     }
     for (command, pause) in
-        ["info", "report"].iter().flat_map(|c| (0..20).map(move |k| (c, 25 * k)))
+        ["info", "report"].iter().flat_map(|c| (0..10).map(move |k| (c, 50 * k)))
     {
         let mut command = directory.command(&[command, "out/scene"]);
         let child =

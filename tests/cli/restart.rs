@@ -159,9 +159,27 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
     }
     // Nor one of results that are gone.
     fs::write(&path, content).expect("mine");
-    directory.write("out/history.csv", "step\n");
+    let history = directory.read("out/history.csv");
+    let without_a_row: Vec<_> = history.lines().enumerate().filter(|(i, _)| *i != 3).collect();
+    let without_a_row: String = without_a_row.iter().map(|(_, row)| format!("{row}\n")).collect();
+    let another_digit = history.replacen("\n1,0.", "\n1,1.", 1);
     let arguments =
         [&["run", "scene.toml", "--out", "out", "--restart"][..], &LONG, &OFTEN].concat();
-    ProgramOutput::of(&mut directory.command(&arguments))
-        .fails(1, &["out/history.csv", "shorter than when the checkpoint was written"]);
+    for changed in ["step\n", &without_a_row, &another_digit] {
+        assert_ne!(history, changed);
+        directory.write("out/history.csv", changed);
+        let before = directory.everything();
+        ProgramOutput::of(&mut directory.command(&arguments))
+            .fails(1, &["out/history.csv", "changed after the checkpoint", "without --restart"]);
+        assert!(directory.everything() == before, "nothing is touched");
+    }
+    // Pictures and reports of the interrupted run do not show the whole one.
+    directory.write("out/history.csv", &history);
+    directory.write("out/pressure.png", "");
+    directory.write("out/report.html", "");
+    directory.write("out/mine.png", "");
+    directory.run(&[&["--out", "out", "--restart"], &LONG[..], &OFTEN].concat());
+    let names = directory.names("out");
+    let is_there = |name: &str| names.iter().any(|other| other == name);
+    assert!(!is_there("pressure.png") && !is_there("report.html") && is_there("mine.png"));
 }
