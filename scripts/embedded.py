@@ -71,6 +71,13 @@ def stop(number, frame):
     raise KeyboardInterrupt(128 + number)
 
 
+def unraisable(ignored):
+    """Ends where Python cannot raise what `stop` raises, as while it removes an object, and would print a traceback."""
+    if isinstance(ignored.exc_value, KeyboardInterrupt):
+        os._exit(ignored.exc_value.args[0])
+    sys.__unraisablehook__(ignored)
+
+
 def program(name):
     """The main function of a script. While its packages are imported the working folder is another one: matplotlib would
     follow a file matplotlibrc there, which can name programs."""
@@ -82,6 +89,7 @@ def program(name):
 
 
 name = sys.argv.pop(1)
+sys.unraisablehook = unraisable
 try:
     sys.stdout, sys.stderr = printable(sys.stdout, "surrogateescape"), printable(sys.stderr, "backslashreplace")
     sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
