@@ -10,9 +10,9 @@ use crate::{
 use nalgebra::DVector;
 
 impl ContactStep<'_> {
-    /// The rigid motions that only contact constrains and no contact force resists. With N nodes, the tolerance
-    /// τ and the force scale F, forces below N τF may be residuals and do not count: by Cauchy and Schwarz, a residual τF works on a rigid motion like a force √N τF. At a lever of one mesh
-    /// width, 1/√N of the body, this is a force N τF.
+    /// The rigid motions that only contact constrains and no contact force resists. With N nodes, the tolerance τ and the force
+    /// scale F, forces below N τF may be residuals and do not count: by Cauchy and Schwarz, a residual τF works on a rigid motion
+    /// like a force √N τF. At a lever of one mesh width, 1/√N of the body, this is a force N τF.
     fn unresisted(&self, contact: &[ContactPoint], force: f64) -> Vec<DVector<f64>> {
         let DiscreteProblem { body, constraints, tolerance, .. } = &**self.problem;
         let uncertain = body.nodes.partition.total() as f64 * tolerance;
