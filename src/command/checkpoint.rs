@@ -37,7 +37,7 @@ pub struct Checkpoint {
 #[derive(Serialize, Deserialize)]
 pub struct Recorded {
     pub fields: FieldsWritten,
-    /// What stands in `history.csv`.
+    /// Length and checksum of `history.csv`.
     pub history: Option<Written>,
 }
 

@@ -14,14 +14,13 @@
 //! [`Attempt`] says from where its solver starts, and with which tolerance. The decision accepts its answer, changes one thing for the next
 //! attempt, or gives up with a reason. Of many answers the step takes the one of least displacement (`one_of_many`).
 //!
-//! What is tried again, and the input that needs it. Each has a test in `tests`:
+//! This table lists everything that a step tries again, and for which input. Each entry has a test in `tests`:
 //!
 //! | place | what changes | for which input |
 //! |---|---|---|
 //! | `decision` | the reference: it moves with a mostly rigid answer | a body that falls through a wide gap |
 //! | `decision` | the load: the residual forces of the answer before; the tolerance | slender bodies, whose last digits bend them |
 //! | `decision` | the solver: the rescuer, from the accepted steps | a fixed point that is slow where nothing stops a rotation |
-//! | `one_of_many` | the contact forces that count as residuals | a body that rests on one point |
 //! | `StepController::decide_failure` | the length of an adaptive step | contact that a solver with few iterations loses |
 //! | `contact/solvers/active_set.rs` | all unknowns in place of the condensed ones | an active set that leaves the small problem singular |
 //! | `contact/solvers/tao.rs` | the unit of displacements, and the centre of the proximal term | a body that contact alone supports |

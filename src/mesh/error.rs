@@ -25,7 +25,7 @@ pub enum MeshError {
         path: PathBuf,
         /// `:LINE` in a text file, `, byte N in $SECTION` in a binary one, empty if not known.
         place: String,
-        /// What is wrong, and what to do. Nodes and elements are named by their tags in the file.
+        /// The problem and its remedy. Nodes and elements have the tags of the file.
         problem: String,
     },
     /// A signal came while gmsh worked.

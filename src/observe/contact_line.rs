@@ -252,7 +252,7 @@ impl ContactLine {
     /// in `all` reactions.
     fn moved<'a>(&'a self, all: &'a [Reaction]) -> impl Iterator<Item = ([usize; 2], f64)> + 'a {
         let place = |k: usize| all.binary_search_by(|of| of[0].total_cmp(&(k as f64))).ok();
-        // The force of another interface node is not divided yet, so no pressure is extrapolated from it.
+        // Interface nodes give no pressure to extrapolate from: their forces are not divided yet.
         let is_interface =
             |line_node: &usize| self.interface_nodes.as_flattened().contains(line_node);
         let extrapolated = move |line_node: usize, direction: isize| {

@@ -205,7 +205,7 @@ impl Supports {
         let rest = inverse * rest;
         let exerted = parts.iter().map(|(number, own, weight)| (*number, own + weight * rest));
         let mut exerted: Vec<_> = exerted.collect();
-        // What is left lies across all supported directions, so it is rounding: the first boundary takes it.
+        // The parts sum to the force, up to rounding. The first boundary takes the difference.
         let all = exerted.iter().map(|(_, own)| own).sum::<Vector2<f64>>();
         exerted[0].1 += force - all;
         exerted

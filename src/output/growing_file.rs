@@ -17,11 +17,11 @@ pub(super) struct GrowingFile {
     pub(super) path: PathBuf,
     beginning: String,
     ending: &'static str,
-    /// What stands before the ending; `None` before the file exists.
+    /// The content before the ending; `None` until the first piece creates the file.
     pub(super) written: Option<Written>,
 }
 
-/// What stands in a file before its ending, for a checkpoint.
+/// The length and the checksum of a file without its ending. A checkpoint keeps them, so that a restart notices a changed file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Written {
     /// The number of bytes.

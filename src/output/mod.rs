@@ -285,7 +285,7 @@ impl Table {
         Ok(Self(GrowingFile::new(path, String::from_utf8_lossy(&header).into_owned(), "")))
     }
 
-    /// What the file holds, for a checkpoint; `None` before the file exists.
+    /// Length and checksum of the file, for a checkpoint; `None` until the first rows create it.
     pub fn written(&self) -> Option<Written> {
         self.0.written
     }

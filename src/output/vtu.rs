@@ -59,7 +59,7 @@ pub struct FieldWriter {
 pub struct FieldsWritten {
     frames: usize,
     last_time: Option<f64>,
-    /// What stands in `fields.pvd`, `contact.pvd` and `contact.csv`.
+    /// Lengths and checksums of `fields.pvd`, `contact.pvd` and `contact.csv`.
     files: [Option<Written>; 3],
 }
 

@@ -107,9 +107,9 @@ pub struct Figure {
     pub name: String,
     /// The part of the name that figures of the body and of its parts share.
     pub kind: &'static str,
-    /// What it describes.
+    /// The body, material, boundary or probe that it describes.
     pub of: Of,
-    /// What it is, in words.
+    /// Its name in words, for people.
     pub label: String,
     /// Its dimension.
     pub dimension: Dimension,
