@@ -29,12 +29,6 @@ pub struct Reduction {
     pub reached: f64,
 }
 
-/// A solve with an old factor may take at least this number of iterations more than with a new one.
-///
-/// Tuned on the 6 plain runs. Half: nothing changes but for `square`, which takes 239 pairs of triangular solves for
-/// 235. Twice: nothing changes.
-const EXTRA_ITERATIONS: usize = 3;
-
 impl RefactorisationPolicy {
     /// For a new factor whose `cost` is given in iterations.
     pub fn new(cost: f64) -> Self {
@@ -58,8 +52,7 @@ impl RefactorisationPolicy {
     /// is due.
     pub fn iteration_limit(&self, asked: f64) -> Option<usize> {
         let left = self.cost - self.lost as f64;
-        (left > 0.0)
-            .then(|| self.fewest(asked).saturating_add((left as usize).max(EXTRA_ITERATIONS)))
+        (left > 0.0).then(|| self.fewest(asked).saturating_add(left.ceil() as usize))
     }
 
     /// ⌈a/ρ⌉; a quotient above a whole number by rounding counts as that number.

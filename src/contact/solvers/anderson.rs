@@ -25,14 +25,9 @@ pub struct Anderson {
 const DEPTH: usize = 10;
 /// A residual above this multiple of the smallest one so far drops the history.
 const OVERSHOOT: f64 = 10.0;
-/// Differences of iterates smaller than this, relative to the largest, are rounding.
+/// Differences of residuals smaller than this, relative to the largest and to the residual, are rounding. The residuals of a
+/// free body that drifts towards its foundation are equal but for these.
 const SAME_ITERATE: f64 = 1e-10;
-
-/// Nearly equal residuals (a free body that drifts towards its foundation) would be extrapolated too far. If a
-/// coefficient of the mixing is larger than this, the method takes the plain step.
-///
-/// Tuned on the 4 penalty-duality runs. Half: the same iterations. Infinity: some free bodies have no answer.
-const FARTHEST: f64 = 1e6;
 
 impl Anderson {
     /// The norm is (Σ w_i q_i²)^½ over all ranks.
@@ -77,11 +72,8 @@ impl Anderson {
         let target = DVector::from(self.comm.gather(&target));
         let differences = DMatrix::from_row_slice(target.len(), earlier.len(), &differences);
         let svd = differences.svd(true, true);
-        let cut = SAME_ITERATE * svd.singular_values.max();
+        let cut = SAME_ITERATE * svd.singular_values.max().max(target.norm());
         let Ok(coefficients) = svd.solve(&target, cut) else { return next };
-        if coefficients.amax() > FARTHEST {
-            return next;
-        }
         for (j, factor) in coefficients.iter().enumerate() {
             let (new, old) = (&self.history[j + 1].0, &self.history[j].0);
             next.iter_mut().zip(new.iter().zip(old)).for_each(|(v, (n, o))| *v -= factor * (n - o));
