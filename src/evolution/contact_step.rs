@@ -18,7 +18,7 @@
 //!
 //! | place | what changes | for which input |
 //! |---|---|---|
-//! | `decision` | the reference: it moves with the rigid part of an answer that is not certified | a body that falls through a wide gap |
+//! | `decision` | the reference: it moves with a mostly rigid answer | a body that falls through a wide gap |
 //! | `decision` | the load: the residual forces of the answer before; the tolerance | slender bodies, whose last digits bend them |
 //! | `decision` | the solver: the rescuer, from the accepted steps | a fixed point that is slow where nothing stops a rotation |
 //! | `StepController::decide_failure` | the length of an adaptive step | contact that a solver with few iterations loses |
