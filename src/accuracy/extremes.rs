@@ -3,6 +3,8 @@
 use super::{Measured, conclusion::KINKS_OF_TABLE};
 use crate::{
     advice::Singular,
+    fem::ON_SIDE,
+    mesh::{distance, extent},
     model::von_mises,
     observe::{ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Value, rows_of},
     petsc::PetscError,
@@ -47,6 +49,8 @@ pub struct Extremes<'a> {
     rows: Vec<ContactRow>,
     /// Each end of contact lies between an active node and the next one: their places, m.
     pub(super) ends: Vec<[[f64; 2]; 2]>,
+    /// The corners at which stresses depend on the direction, m.
+    directions: Vec<[f64; 2]>,
 }
 
 impl<'a> Extremes<'a> {
@@ -72,7 +76,8 @@ impl<'a> Extremes<'a> {
         let all = figures.filter_map(extreme).collect();
         let (_, ends) = problem.supports.contact.length(&rows);
         let unresolved = problem.unresolved_peaks(&rows);
-        let mut extremes = Self { problem, all, stresses, rows, ends };
+        let directions = problem.rays(state).iter().map(|rays| rays.at).collect();
+        let mut extremes = Self { problem, all, stresses, rows, ends, directions };
         let near = extremes.near(&unresolved, 1.001);
         extremes.all.iter_mut().zip(near).for_each(|(of, name)| of.unresolved = name);
         extremes.find_jumps();
@@ -112,7 +117,8 @@ impl<'a> Extremes<'a> {
         measured: &Measured,
     ) -> Result<Vec<Extreme>, PetscError> {
         let extremes = Extremes::new(problem, state, values)?;
-        let mut all = extremes.named(&problem.singular_points());
+        let points = problem.singular_points();
+        let mut all = extremes.named(&points);
         for extreme in &mut all {
             let part = &problem.figures[problem.part_of(extreme.number, values)];
             match measured.not_converged.contains(&part.name) {
@@ -133,8 +139,35 @@ impl<'a> Extremes<'a> {
                 *reason += &format!(": {KINKS_OF_TABLE}");
             }
         }
+        all.extend(extremes.at_probes(&points));
         all.extend(extremes.unresolved_lengths(state));
         Ok(all)
+    }
+
+    /// The stresses at probes at the singular `points`, and at corners where the stress depends on the direction.
+    pub(super) fn at_probes(&self, points: &[Singular]) -> Vec<Extreme> {
+        let (scene, rounding) =
+            (self.problem.scene(), ON_SIDE * extent(&self.problem.mesh().nodes));
+        let presses = |at: [f64; 2]| self.presses(at);
+        let of_figure = |(number, figure): (usize, &Figure)| {
+            let Of::Probe(name) = &figure.of else { return None };
+            let at = scene.probes.iter().find(|probe| probe.name == *name)?.point;
+            let is_here = |place: &[f64; 2]| distance(*place, at) <= rounding;
+            let singular =
+                points.iter().find(|of| is_here(&of.at) && !(of.is_open && presses(of.at)));
+            let by_direction = self.directions.iter().any(|place| is_here(place));
+            let reason = "it depends on the direction there".to_owned();
+            (figure.dimension == Dimension::Stress && (singular.is_some() || by_direction)).then(
+                || Extreme {
+                    number,
+                    name: figure.name.clone(),
+                    at,
+                    singular: singular.map(|point| point.name.clone()),
+                    unresolved: singular.is_none().then_some(reason),
+                },
+            )
+        };
+        self.problem.figures.iter().enumerate().filter_map(of_figure).collect()
     }
 
     /// The lengths of contact that the mesh does not resolve: single nodes are active, or none, but the obstacle enters the body
@@ -165,12 +198,13 @@ impl<'a> Extremes<'a> {
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
         /// On six bodies half of it changed nothing; twice of it changed meshes.
         const EDGES: f64 = 3.001;
-        let presses = |[x, y]: [f64; 2]| {
-            self.rows.iter().any(|row| (row.x, row.y) == (x, y) && row.pressure > 0.0)
-        };
-        let points = points.iter().filter(|of| !of.is_open || !presses(of.at)).cloned();
+        let points = points.iter().filter(|of| !of.is_open || !self.presses(of.at)).cloned();
         let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points), EDGES));
         extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
+    }
+
+    fn presses(&self, [x, y]: [f64; 2]) -> bool {
+        self.rows.iter().any(|row| (row.x, row.y) == (x, y) && row.pressure > 0.0)
     }
 
     /// Per extreme: the name of the nearest of the `points` of the boundary within some `edges`. A stress that is large

@@ -86,8 +86,9 @@ pub(super) struct Measurement {
     /// Per triangle: its share of the squared error of ζ, and max |Δζ|; empty without damage.
     of_damage: Vec<f64>,
     zeta: Vec<f64>,
-    /// The extremes of stresses and pressures on the bisected mesh.
+    /// The extremes of stresses and pressures on the bisected mesh, and the stresses at probes that have no value.
     of_points: Vec<Extreme>,
+    at_probes: Vec<Extreme>,
     /// The mesh bisected everywhere and the answer there.
     finer: Option<(Refinement, Answer)>,
 }
@@ -204,7 +205,9 @@ impl Measurement {
             measured.result.damage = Some(measured.of_damage.iter().sum::<f64>().sqrt());
             measured.zeta = largest;
         }
-        measured.of_points = fine.extremes.named(&problem.singular_points());
+        let points = problem.singular_points();
+        measured.of_points = fine.extremes.named(&points);
+        measured.at_probes = fine.extremes.at_probes(&points);
         measured
     }
 
@@ -223,6 +226,7 @@ impl Measurement {
             sequence.converges(part.number, part)
         };
         let not_converged = self.of_points.iter().filter(|of| !converges(of));
+        let not_converged = not_converged.chain(&self.at_probes);
         self.result.not_converged = not_converged.map(|of| of.name.clone()).collect();
         self.set_bars_of_settled(sequence, coarse);
     }

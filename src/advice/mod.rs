@@ -11,10 +11,9 @@ mod collapse;
 mod notes;
 mod peaks;
 mod penetration;
-mod singular;
 mod unresolved;
 
+pub(crate) use crate::problem::SEEN;
+pub use crate::problem::Singular;
 pub use notes::locks;
-pub(crate) use singular::SEEN;
-pub use singular::Singular;
 pub(crate) use unresolved::{missed_mean, unresolved};

@@ -4,7 +4,7 @@
 //! - The gap has a kink there. A wedge whose slope changes by Δ presses with (E Δ/2π) ln(2a/r) at the distance r from its
 //!   tip (Johnson, Contact Mechanics, 5.2), a the half length of contact. A bisection of the edges adds (E Δ/2π) ln 2.
 
-use super::{Singular, singular::SEEN};
+use super::{SEEN, Singular};
 use crate::{observe::ContactRow, problem::DiscreteProblem};
 use std::f64::consts::{LN_2, TAU};
 

@@ -10,6 +10,7 @@
 
 mod contact_figures;
 mod contact_line;
+mod corners;
 mod figures;
 mod mean_displacement;
 mod nodal_stress;
@@ -18,6 +19,7 @@ mod supports;
 
 pub(crate) use contact_figures::{ContactFigures, rows_of};
 pub use contact_line::{ContactLine, ContactRow};
+pub use corners::Rays;
 pub use figures::{Bar, Dimension, Figure, Figures, Of, Value, in_words};
 pub(crate) use figures::{NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
 pub use nodal_stress::{NodalStress, Strained, principal, principal_direction};
@@ -30,6 +32,7 @@ use crate::{
     problem::{DiscreteProblem, SetupError},
     scene::Scene,
 };
+use corners::LoadedCorner;
 use mean_displacement::Means;
 use probe::Probes;
 use std::{
@@ -48,6 +51,8 @@ pub struct ObservedProblem {
     /// Everything that a run prints.
     pub figures: Figures,
     nodal_stress: OnceLock<Arc<NodalStress>>,
+    /// The corners at which stresses may depend on the direction.
+    corners: OnceLock<Vec<LoadedCorner>>,
 }
 
 impl ObservedProblem {
@@ -64,6 +69,7 @@ impl ObservedProblem {
             means: Means::new(problem.scene(), &problem.body, &lines),
             figures: Figures::of(&problem, &supports),
             nodal_stress: OnceLock::new(),
+            corners: OnceLock::new(),
             supports,
             problem,
         })
@@ -80,6 +86,7 @@ impl ObservedProblem {
             probes: self.probes.restrict(&self.body, &subdomain),
             means: self.means.restrict(&subdomain),
             nodal_stress: OnceLock::new(),
+            corners: OnceLock::new(),
             problem: self.problem.restrict(subdomain),
             ..self
         })

@@ -1,9 +1,14 @@
 //! Stresses at the nodes, as engineers look at them: continuous within a material.
 
-use super::{ObservedProblem, Value, figures::greatest};
+use super::{
+    ObservedProblem, Rays, Value,
+    corners::{Known, sizes},
+    figures::greatest,
+};
 use crate::{
     fem::{Fits, Partition, Patches, for_elements},
-    model::{Material, von_mises},
+    mesh::distance,
+    model::Material,
     petsc::PetscError,
     problem::{DiscreteProblem, State},
 };
@@ -22,7 +27,9 @@ pub struct NodalStress {
     pub(crate) points: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
-    materials: Vec<(Material, Matrix3<f64>)>,
+    pub(super) materials: Vec<(Material, Matrix3<f64>)>,
+    /// Per vertex: the length of its longest edge, m.
+    longest: Vec<f64>,
 }
 
 /// A node, as a point of one material.
@@ -73,7 +80,14 @@ impl NodalStress {
             }
         }
         let materials = problem.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
-        Self { patches: Arc::clone(body.patches()), points, cells, materials }
+        let mut longest = vec![0.0; body.mesh.nodes.len()];
+        for &[a, b, c] in &body.mesh.triangles {
+            for [p, q] in [[a, b], [b, c], [c, a]] {
+                let length = distance(body.mesh.nodes[p], body.mesh.nodes[q]);
+                [p, q].iter().for_each(|&of| longest[of] = length.max(longest[of]));
+            }
+        }
+        Self { patches: Arc::clone(body.patches()), points, cells, materials, longest }
     }
 
     /// The node of each point.
@@ -84,6 +98,17 @@ impl NodalStress {
     /// The coordinates of the points, m.
     pub fn places(&self) -> Vec<[f64; 2]> {
         self.points.iter().map(|point| point.at).collect()
+    }
+
+    /// The places of the vertices whose fits give the stress at a point, m.
+    pub(super) fn ends_of(&self, point: &Point) -> [[f64; 2]; 2] {
+        point.ends.map(|end| self.patches.vertices[end])
+    }
+
+    /// The length of the longest edge at a point, over its distance from another one.
+    pub(super) fn relative_size(&self, point: &Point, from: [f64; 2]) -> f64 {
+        let [a, b] = point.ends.map(|end| self.longest[end]);
+        a.max(b) / distance(point.at, from)
     }
 
     /// The strains and ζ of `state`, from which its stresses are computed.
@@ -131,21 +156,37 @@ impl ObservedProblem {
         self.nodal_stress.get_or_init(|| NodalStress::new(self).into())
     }
 
-    /// The largest von Mises stress and σ₁, and the smallest σ₂, Pa, of the body and of each of several materials. Collective.
+    /// The largest von Mises stress and σ₁, and the smallest σ₂, Pa, of the body and of each of several materials. At corners with
+    /// `rays` these count instead of the fits. Collective.
     ///
     /// # Errors
     /// PETSc failed.
-    pub(crate) fn extreme_stresses(&self, of: &Strained) -> Result<Vec<[Value; 3]>, PetscError> {
+    pub(crate) fn extreme_stresses(
+        &self,
+        of: &Strained,
+        rays: &[Rays],
+    ) -> Result<Vec<[Value; 3]>, PetscError> {
         let (nodal, body) = (self.nodal_stress(), &self.body);
         let fits = nodal.patches.fits(&of.strains, Some(&body.vertices.partition))?;
         let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; nodal.materials.len()];
-        for point in &nodal.points {
-            let stress = nodal.stress(point, of, &fits);
-            let [most, least] = principal(stress);
-            let values = [von_mises(stress), most, -least];
-            for (largest, value) in largest[point.material].iter_mut().zip(values) {
-                if value >= largest.0 {
-                    *largest = (value, point.at);
+        let sizes_at = |point: &Point| sizes(nodal.stress(point, of, &fits));
+        let corners = Known::all(self, rays, sizes_at);
+        for (i, point) in nodal.points.iter().enumerate() {
+            if corners.iter().any(|corner| corner.is_near(i, point)) {
+                continue;
+            }
+            let values = sizes_at(point);
+            for (k, largest) in largest[point.material].iter_mut().enumerate() {
+                let counts = |of: &Known| of.is_exceeded(nodal, point, k, values[k]);
+                if values[k] >= largest.0 && corners.iter().all(counts) {
+                    *largest = (values[k], point.at);
+                }
+            }
+        }
+        for corner in &corners {
+            for (largest, own) in largest.iter_mut().zip(&corner.extremes) {
+                for (largest, &own) in largest.iter_mut().zip(own) {
+                    *largest = if own > largest.0 { (own, corner.at) } else { *largest };
                 }
             }
         }

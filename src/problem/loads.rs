@@ -7,7 +7,7 @@ mod parts;
 
 pub(crate) use curve::LoadCurve;
 pub(super) use jumps::near_jumps;
-pub(crate) use jumps::{jump, load_jumps};
+pub(super) use jumps::{jump, load_jumps};
 pub(crate) use parts::{DEVIATION, centroid, edge_parts, triangle_parts, triangle_point};
 
 use super::boundary_conditions::{BoundaryConditions, RowValue};

@@ -13,18 +13,23 @@
 
 mod boundary_conditions;
 mod collapse;
+mod directions;
 mod error;
 mod loads;
+mod singular;
 mod state;
 
 pub use collapse::Collapse;
+pub(crate) use directions::{Corner, Effect};
 pub use error::SetupError;
 pub use loads::Loads;
 use loads::near_jumps;
 pub(crate) use loads::{
-    DEVIATION, ElementLoads, LoadCurve, NOTED, SAMPLE_TIMES, centroid, edge_parts, jump,
-    load_jumps, triangle_parts, triangle_point,
+    DEVIATION, ElementLoads, LoadCurve, NOTED, SAMPLE_TIMES, centroid, edge_parts, triangle_parts,
+    triangle_point,
 };
+pub(crate) use singular::SEEN;
+pub use singular::Singular;
 pub use state::State;
 
 use crate::{

@@ -18,6 +18,7 @@ mod conservation;
 mod contact;
 mod contact_pressure;
 mod damage;
+mod directions;
 mod elements;
 mod equilibrated;
 mod extrapolation;

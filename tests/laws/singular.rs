@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Sectors around the origin: an angle in degrees and Young's modulus for each, on curves `first` and `last` or, in a full
 /// circle without them, around a point inside the body.
-fn fan(sectors: &[(f64, f64)], closed: bool) -> Mesh {
+pub fn fan(sectors: &[(f64, f64)], closed: bool) -> Mesh {
     const RINGS: usize = 3;
     let (mut mesh, mut angle, mut spokes) = (Mesh::default(), 0.0_f64, vec![(0.0, 0)]);
     for (i, (degrees, _)) in sectors.iter().enumerate() {

@@ -90,7 +90,7 @@ impl Observation {
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.
             contact_force: comm.total(active.map(|point| point.force).sum()) + 0.0,
-            stresses: problem.extreme_stresses(&strained)?,
+            stresses: problem.extreme_stresses(&strained, &problem.rays(state))?,
             strained,
             contact: [of_rows(&rows)].into_iter().chain(foundations).collect(),
             resultants,

@@ -8,12 +8,16 @@
 //! z is continuous at interfaces. Sectors with the angles α₁, α₂, … transfer it by T = … exp(α₂A₂) exp(α₁A₁). The sides
 //! have conditions B z = 0 and C z = 0, so that det(B; CT) = 0. Inside the body z returns to itself: det(T − I) = 0.
 
+use super::{
+    DiscreteProblem, SAMPLE_TIMES,
+    directions::{Corner, Effect, Side},
+    loads::{jump, load_jumps},
+};
 use crate::{
     mesh::Lines,
-    problem::{DiscreteProblem, jump, load_jumps},
     scene::{Boundary, Condition},
 };
-use nalgebra::{Complex, Matrix2x4, Matrix3, Matrix4};
+use nalgebra::{Complex, Matrix2x4, Matrix3, Matrix4, Matrix5, Vector4};
 use rustc_hash::FxHashMap as HashMap;
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -34,28 +38,52 @@ pub struct Singular {
 /// A condition on an edge, and its boundary.
 type Support<'a> = (&'a Condition, &'a Boundary);
 
+/// A sector of one material at a corner.
+#[derive(Debug, Clone)]
+pub(super) struct Sector {
+    /// The number of the material, and its stiffness, Pa.
+    pub(super) material: usize,
+    pub(super) stiffness: Matrix3<f64>,
+    /// rad.
+    pub(super) angle: f64,
+}
+
+impl Sector {
+    /// A(λ) for stresses in the `unit`, Pa.
+    fn system(&self, unit: f64, l: Complex<f64>) -> Matrix4<Complex<f64>> {
+        let [d, nu_d, mu] = [(0, 0), (0, 1), (2, 2)].map(|entry| self.stiffness[entry] / unit);
+        let (nu, [o, i]) = (nu_d / d, [0.0, 1.0].map(Complex::from));
+        Matrix4::from([
+            [o, -i - l * nu, -l * l * d * (1.0 - nu * nu), o],
+            [i - l, o, o, o],
+            [i / mu, o, o, -i - l],
+            [o, i / d, i - l * nu, o],
+        ])
+    }
+
+    /// The system of degree 0 for (z, ω), see [`super::directions`].
+    pub(super) fn system_of_degree_0(&self, unit: f64) -> Matrix5<f64> {
+        let own = self.system(unit, 1.0.into()).map(|entry| entry.re);
+        let mut system = own.fixed_resize::<5, 5>(0.0);
+        system[(0, 4)] = -1.0;
+        system
+    }
+}
+
 /// A bisection that raises an extreme by less than this fraction shows no singularity.
 pub(crate) const SEEN: f64 = 0.02;
 /// Bounds of Re λ and |Im λ|. Above 0.975 a bisection raises the stress by less than [`SEEN`]; λ = 0 is a rigid motion.
 const LAMBDA: [f64; 3] = [0.03, 0.975, 1.5];
 /// Number of parts of each side of this rectangle.
 const PARTS_OF_SIDE: usize = 48;
-/// Are stresses singular where sectors (stiffness and angle, rad) meet, with conditions on two sides, or inside the body?
+/// Are stresses singular where sectors meet, with conditions on two sides, or inside the body?
 /// The determinant is real on the real axis. So along the half of the rectangle's border above this axis its argument changes by π times
 /// the number of its roots inside (argument principle).
-fn is_singular(sectors: &[(Matrix3<f64>, f64)], sides: Option<[Matrix2x4<f64>; 2]>) -> bool {
-    let unit: f64 = sectors.iter().map(|(stiffness, _)| stiffness[(2, 2)]).sum();
+fn is_singular(sectors: &[Sector], sides: Option<[Matrix2x4<f64>; 2]>) -> bool {
+    let unit: f64 = sectors.iter().map(|sector| sector.stiffness[(2, 2)]).sum();
     let determinant = |l: Complex<f64>| {
-        let transfer = sectors.iter().fold(Matrix4::identity(), |transfer, (stiffness, angle)| {
-            let [d, nu_d, mu] = [(0, 0), (0, 1), (2, 2)].map(|entry| stiffness[entry] / unit);
-            let (nu, [o, i]) = (nu_d / d, [0.0, 1.0].map(Complex::from));
-            let columns = [
-                [o, -i - l * nu, -l * l * d * (1.0 - nu * nu), o],
-                [i - l, o, o, o],
-                [i / mu, o, o, -i - l],
-                [o, i / d, i - l * nu, o],
-            ];
-            (Matrix4::from(columns) * Complex::from(*angle)).exp() * transfer
+        let transfer = sectors.iter().fold(Matrix4::identity(), |transfer, sector| {
+            (sector.system(unit, l) * Complex::from(sector.angle)).exp() * transfer
         });
         let Some(sides) = sides else { return (transfer - Matrix4::identity()).determinant() };
         let [first, last] = sides.map(|side| side.map(Complex::from));
@@ -99,8 +127,10 @@ fn conditions(support: Option<&Support>, angle: f64) -> (u8, Vec<Matrix2x4<f64>>
 /// The lines of a mesh and the triangles at their nodes.
 struct Wedges<'a> {
     lines: Lines<'a>,
-    /// By the side ab of a triangle abc with a on a line: the node c and the stiffness.
-    next: HashMap<[usize; 2], (usize, Matrix3<f64>)>,
+    /// By the side ab of a triangle abc with a on a line: the node c and the material.
+    next: HashMap<[usize; 2], (usize, usize)>,
+    /// Per material: its stiffness, Pa.
+    stiffness: Vec<Matrix3<f64>>,
 }
 
 impl Wedges<'_> {
@@ -111,13 +141,16 @@ impl Wedges<'_> {
     }
 
     /// The sectors counter-clockwise from the edge to `first`, and the end of the last edge.
-    fn around(&self, node: usize, first: usize) -> (Vec<(Matrix3<f64>, f64)>, usize) {
-        let (mut sectors, mut end) = (Vec::<(Matrix3<f64>, f64)>::new(), first);
-        while let Some(&(next, stiffness)) = self.next.get(&[node, end]) {
+    fn around(&self, node: usize, first: usize) -> (Vec<Sector>, usize) {
+        let (mut sectors, mut end) = (Vec::<Sector>::new(), first);
+        while let Some(&(next, material)) = self.next.get(&[node, end]) {
             let turn = wrapped(self.tangent(node, next) - self.tangent(node, end));
             match sectors.last_mut() {
-                Some((last, angle)) if *last == stiffness => *angle += turn,
-                _ => sectors.push((stiffness, turn)),
+                Some(last) if last.material == material => last.angle += turn,
+                _ => {
+                    let stiffness = self.stiffness[material];
+                    sectors.push(Sector { material, stiffness, angle: turn });
+                }
             }
             end = next;
             if end == first {
@@ -136,6 +169,11 @@ fn wrapped(angle: f64) -> f64 {
 impl DiscreteProblem {
     /// The points of the whole body with singular stresses.
     pub fn singular_points(&self) -> Vec<Singular> {
+        self.corners().0
+    }
+
+    /// The points of the whole body with singular stresses, and its other corners.
+    pub(crate) fn corners(&self) -> (Vec<Singular>, Vec<Corner>) {
         let (wedges, supports) = (self.wedges(), self.supports_of_edges());
         let is_side = |edge: [usize; 2]| wedges.next.contains_key(&edge);
         let first = wedges.lines.ends.iter().flat_map(|(&node, ends)| {
@@ -144,28 +182,66 @@ impl DiscreteProblem {
             let first = ends.iter().copied().filter(is_first);
             first.chain(is_inside.then_some(ends[0])).map(move |first| [node, first])
         });
-        let corners = first.filter_map(|edge| self.singular(&wedges, &supports, edge));
-        corners.chain(self.shear_jumps(&wedges.lines)).collect()
+        let jumps = load_jumps(self.scene(), self.mesh(), &wedges.lines);
+        let jumps = jumps.into_iter().filter_map(|(node, jump)| self.jump(&wedges, node, jump));
+        let corners = first.filter_map(|edge| self.corner(&wedges, &supports, edge)).chain(jumps);
+        let (mut singular, mut others) = (Vec::new(), Vec::new());
+        for corner in corners {
+            match corner {
+                Ok(point) => singular.push(point),
+                Err(corner) => others.push(corner),
+            }
+        }
+        (singular, others)
     }
 
-    /// The jumps of a shear load τ on smooth boundaries: nearby σ_tt grows like (2τ/π) ln r along the tangent t. A jump of the
-    /// normal load leaves stresses bounded.
-    fn shear_jumps(&self, lines: &Lines) -> Vec<Singular> {
-        let singular = |(node, [x, y, pressure]): (usize, [f64; 3])| {
-            let ends = &lines.ends[&node];
-            let [tx, ty] = lines.tangent(node, ends[0]);
-            let shear = (x * tx + y * ty).abs() / tx.hypot(ty);
-            let radius =
-                ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max);
-            let (at, name) = (self.mesh().nodes[node], "a jump of a shear load".to_owned());
-            (shear > SEEN * x.hypot(y).hypot(pressure)).then_some(Singular {
-                at,
-                radius,
-                name,
-                is_open: false,
-            })
-        };
-        load_jumps(self.scene(), self.mesh(), lines).into_iter().filter_map(singular).collect()
+    /// The singular point, or else the corner, at a `jump` of the loads (t_x, t_y, pressure), Pa, on a smooth free boundary.
+    fn jump(
+        &self,
+        wedges: &Wedges,
+        node: usize,
+        [x, y, pressure]: [f64; 3],
+    ) -> Option<Result<Singular, Corner>> {
+        let is_first = |end: &&usize| !wedges.next.contains_key(&[**end, node]);
+        let first = *wedges.lines.ends[&node].iter().find(is_first)?;
+        let (sectors, last) = wedges.around(node, first);
+        let sides = [first, last].map(|end| (end, conditions(None, 0.0).1));
+        let corner = self.sides_of(wedges, node, sectors, sides);
+        let [nx, ny] = corner.sides[0].normal(false);
+        let load = corner.sides[0].of_traction([x - pressure * nx, y - pressure * ny], false);
+        let grows = matches!(corner.effect_of([load, Vector4::zeros()], false), Effect::Singular);
+        let (at, radius) = (corner.at, self.radius(wedges, node));
+        let name = "a jump of a shear load".to_owned();
+        Some(if grows { Ok(Singular { at, radius, name, is_open: false }) } else { Err(corner) })
+    }
+
+    /// The length of the longest edge of a line at the node, m.
+    fn radius(&self, wedges: &Wedges, node: usize) -> f64 {
+        let lengths = wedges.lines.ends[&node].iter();
+        lengths.map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max)
+    }
+
+    /// The corner with these sectors and, per side, the end of its edge and the rows of its conditions.
+    fn sides_of(
+        &self,
+        wedges: &Wedges,
+        node: usize,
+        sectors: Vec<Sector>,
+        sides: [(usize, Vec<Matrix2x4<f64>>); 2],
+    ) -> Corner {
+        let (mesh, boundaries) = (self.mesh(), &self.scene().boundaries);
+        let sides = sides.map(|(end, rows)| {
+            let edges = [[node, end], [end, node]];
+            let is_on =
+                |of: &Boundary| mesh.edges_of(&of.name).iter().any(|edge| edges.contains(edge));
+            Side {
+                end: mesh.nodes[end],
+                angle: wedges.tangent(node, end),
+                rows,
+                boundaries: (0..boundaries.len()).filter(|&i| is_on(&boundaries[i])).collect(),
+            }
+        });
+        Corner { node, at: mesh.nodes[node], sectors, sides }
     }
 
     /// The lines of the mesh with its wedges.
@@ -178,22 +254,29 @@ impl DiscreteProblem {
         for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
             let sides = [[a, b, c], [b, c, a], [c, a, b]].into_iter();
             let sides = sides.filter(|side| lines.ends.contains_key(&side[0]));
-            next.extend(sides.map(|[p, q, r]| ([p, q], (r, stiffness[material(t)]))));
+            next.extend(sides.map(|[p, q, r]| ([p, q], (r, material(t)))));
         }
-        Wedges { lines, next }
+        Wedges { lines, next, stiffness }
     }
 
-    /// The singular point of the sectors at a node counter-clockwise from the edge to `first`.
-    fn singular(
+    /// The singular point, or else the corner, of the sectors at a node counter-clockwise from the edge to `first`. `None` inside the
+    /// body and on smooth lines with the same conditions on both sides.
+    fn corner(
         &self,
         wedges: &Wedges,
         supports: &BTreeMap<[usize; 2], Support>,
         [node, first]: [usize; 2],
-    ) -> Option<Singular> {
-        let (mut sectors, last) = wedges.around(node, first);
+    ) -> Option<Result<Singular, Corner>> {
+        let (sectors, last) = wedges.around(node, first);
+        let mut within = sectors.clone();
+        within.dedup_by(|next, of| {
+            let is_same = next.stiffness == of.stiffness;
+            of.angle += if is_same { next.angle } else { 0.0 };
+            is_same
+        });
         // The tangents of other curves than circles are not exact: a corner is not re-entrant within their errors.
-        if let [(_, angle)] = &mut sectors[..] {
-            *angle -=
+        if let [of] = &mut within[..] {
+            of.angle -=
                 [first, last].map(|end| wedges.lines.tangent_error(node, end)).iter().sum::<f64>();
         }
         let sides = [[node, first], [last, node]].map(|edge| supports.get(&edge));
@@ -216,12 +299,26 @@ impl DiscreteProblem {
         // it is closed on both sides of the end, or open on both.
         let cases = (0..of_a.len()).flat_map(|i| (0..of_b.len()).map(move |k| [i, k]));
         let mut cases = cases.filter(|[i, k]| !is_same || i == k);
-        let case = cases
-            .find(|&[i, k]| is_singular(&sectors, (!is_inside).then_some([of_a[i], of_b[k]])))?;
-        let is_open = case == [of_a.len() - 1, of_b.len() - 1] && case != [0, 0];
+        let case =
+            cases.find(|&[i, k]| is_singular(&within, (!is_inside).then_some([of_a[i], of_b[k]])));
+        let is_open = case == Some([of_a.len() - 1, of_b.len() - 1]) && case != Some([0, 0]);
         let of = sides[usize::from(b > a)].map_or("", |(_, boundary)| &*boundary.name);
-        let lengths = ends.iter().map(|&end| self.mesh().edge_normal([node, end]).1);
-        let name = match sectors.len() {
+        let (at, radius) = (self.mesh().nodes[node], self.radius(wedges, node));
+        if case.is_none() {
+            if is_inside {
+                return None;
+            }
+            let corner = self.sides_of(wedges, node, sectors, [(first, of_a), (last, of_b)]);
+            let mut times = self.scene().sample_times(SAMPLE_TIMES).into_iter();
+            let grows = |t| matches!(corner.effect(self.scene(), t, true), Effect::Singular);
+            let name = match of {
+                "" => "a jump of a shear load".to_owned(),
+                _ => format!("a load at the end of `{of}`"),
+            };
+            let singular = Singular { at, radius, name, is_open };
+            return Some(if times.any(grows) { Ok(singular) } else { Err(corner) });
+        }
+        let name = match within.len() {
             _ if is_inside => "a corner of an inclusion".to_owned(),
             2.. => "the end of an interface of two materials".to_owned(),
             _ if jumps => format!("a jump of the gap of `{of}`"),
@@ -229,8 +326,7 @@ impl DiscreteProblem {
             _ if a != b => format!("the end of `{of}`"),
             _ => "a re-entrant corner".to_owned(),
         };
-        let (at, radius) = (self.mesh().nodes[node], lengths.fold(0.0, f64::max));
-        Some(Singular { at, radius, name, is_open })
+        Some(Ok(Singular { at, radius, name, is_open }))
     }
 
     /// Does the gap jump between the middles of the edges pq and qr of Γ_C, at the start or the end of the run?

@@ -1,0 +1,138 @@
+//! The corners at which stresses depend on the direction.
+//!
+//! In the triangles around such a corner u_h is as wrong on a fine mesh as on a coarse one: stresses overshoot at its own scale. Theory
+//! knows their extreme F over all directions. Fits from these triangles do not count. With C = max (f − F) r/h over their
+//! points, where r is the distance from the corner and h the longest edge at a point, a stress f elsewhere counts only beyond F + C h/r.
+
+use super::{NodalStress, ObservedProblem, nodal_stress::Point, principal};
+use crate::{
+    model::von_mises,
+    problem::{Corner, Effect, State},
+};
+use nalgebra::Vector3;
+use rustc_hash::FxHashSet as HashSet;
+use std::sync::OnceLock;
+
+/// A corner.
+#[derive(Debug)]
+pub(super) struct LoadedCorner {
+    corner: Corner,
+    /// Per point of this rank: does its stress come from fits in the triangles at the corner or next to them?
+    near: OnceLock<Vec<bool>>,
+}
+
+/// The stresses in many directions at a corner.
+pub struct Rays<'a> {
+    /// The corner, m.
+    pub at: [f64; 2],
+    /// Per direction: the material, and (σ_xx, σ_yy, σ_xy), Pa; `None` if other loads than those on the sides determine them.
+    pub stresses: Option<Vec<(usize, [f64; 3])>>,
+    of: &'a LoadedCorner,
+}
+
+/// The extremes over the directions at a corner.
+pub(super) struct Known<'a> {
+    pub(super) at: [f64; 2],
+    /// Per material: F of the von Mises stress, σ₁ and −σ₂, Pa; −∞ if it is not at the corner.
+    pub(super) extremes: Vec<[f64; 3]>,
+    /// Per material: C of the same, Pa.
+    excess: Vec<[f64; 3]>,
+    near: &'a [bool],
+}
+
+/// The von Mises stress, σ₁ and −σ₂ of (σ_xx, σ_yy, σ_xy, σ_zz), Pa.
+pub(super) fn sizes(stress: [f64; 4]) -> [f64; 3] {
+    let [most, least] = principal(stress);
+    [von_mises(stress), most, -least]
+}
+
+impl ObservedProblem {
+    /// The corners at which stresses depend on the direction in a `state`. Collective.
+    pub fn rays(&self, state: &State) -> Vec<Rays<'_>> {
+        let corners = self.corners.get_or_init(|| {
+            let new = |corner| LoadedCorner { corner, near: OnceLock::new() };
+            self.problem.corners().1.into_iter().map(new).collect()
+        });
+        let active = state.of_contact().filter(|of| of.active);
+        let active = Vec::from_iter(active.map(|of| self.body.nodes.points[of.node]));
+        let rays = |of: &'_ LoadedCorner| {
+            let at = of.corner.at;
+            let is_closed = of.corner.may_open() && self.body.comm().any(active.contains(&at));
+            match of.corner.effect(self.scene(), state.time, is_closed) {
+                Effect::ByDirection(stresses) => Some((at, stresses)),
+                _ => None,
+            }
+        };
+        let found = corners.iter().filter_map(|of| Some((of, rays(of)?)));
+        found.map(|(of, (at, stresses))| Rays { at, stresses, of }).collect()
+    }
+}
+
+impl Known<'_> {
+    /// The corners with known extremes, where `sizes_at` gives the [`sizes`] of the fits at a point. Collective.
+    pub(super) fn all<'a>(
+        problem: &ObservedProblem,
+        rays: &'a [Rays],
+        sizes_at: impl Fn(&Point) -> [f64; 3],
+    ) -> Vec<Known<'a>> {
+        let nodal = problem.nodal_stress();
+        let known = |rays: &'a Rays| {
+            let mut extremes = vec![[f64::NEG_INFINITY; 3]; nodal.materials.len()];
+            for &(material, [xx, yy, xy]) in rays.stresses.as_ref()? {
+                let zz = nodal.materials[material].0.out_of_plane(&Vector3::new(xx, yy, xy));
+                let of = sizes([xx, yy, xy, zz]);
+                (0..3).for_each(|k| extremes[material][k] = of[k].max(extremes[material][k]));
+            }
+            let mut excess = vec![[0.0; 3]; extremes.len()];
+            let near = rays.near(problem);
+            for point in nodal.points.iter().zip(near).filter(|(_, near)| **near).map(|of| of.0) {
+                let (own, size) = (sizes_at(point), nodal.relative_size(point, rays.at));
+                for k in 0..3 {
+                    let over: f64 = (own[k] - extremes[point.material][k]) / size;
+                    excess[point.material][k] = over.max(excess[point.material][k]);
+                }
+            }
+            let comm = problem.body.comm();
+            excess.as_flattened_mut().iter_mut().for_each(|of| *of = comm.max(*of));
+            Some(Known { at: rays.at, extremes, excess, near })
+        };
+        rays.iter().filter_map(known).collect()
+    }
+
+    /// Is the point of this rank with the number `i` next to the corner, in a material of the corner?
+    pub(super) fn is_near(&self, i: usize, point: &Point) -> bool {
+        self.near[i] && self.extremes[point.material][0] > f64::NEG_INFINITY
+    }
+
+    /// Does the value number `k` of the [`sizes`] at this point exceed what the corner causes?
+    pub(super) fn is_exceeded(
+        &self,
+        nodal: &NodalStress,
+        point: &Point,
+        k: usize,
+        value: f64,
+    ) -> bool {
+        let [extreme, excess] = [&self.extremes, &self.excess].map(|of| of[point.material][k]);
+        extreme == f64::NEG_INFINITY
+            || value > extreme + excess * nodal.relative_size(point, self.at)
+    }
+}
+
+impl Rays<'_> {
+    /// Per point of this rank: is it next to the corner?
+    fn near(&self, problem: &ObservedProblem) -> &[bool] {
+        self.of.near.get_or_init(|| {
+            let (mesh, nodal) = (problem.mesh(), problem.nodal_stress());
+            let mut vertices = HashSet::from_iter([self.of.corner.node]);
+            for _ in 0..2 {
+                let triangles = mesh.triangles.iter();
+                let here = triangles.filter(|of| of.iter().any(|v| vertices.contains(v)));
+                vertices.extend(Vec::from_iter(here.flatten().copied()));
+            }
+            let bits = |at: [f64; 2]| at.map(f64::to_bits);
+            let places: HashSet<_> = vertices.into_iter().map(|v| bits(mesh.nodes[v])).collect();
+            let is_near = |point| nodal.ends_of(point).iter().any(|&at| places.contains(&bits(at)));
+            nodal.points.iter().map(is_near).collect()
+        })
+    }
+}
