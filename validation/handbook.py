@@ -11,9 +11,8 @@ A scene of handbook/ has its truth in comments, one line for each figure of summ
 
 Every scene runs with uniform triangles of the first and the second order and `--bars`, and with `--accuracy`. A bar holds
 if it covers the error and the truth's own error. "Reached" is true if no error exceeds the accuracy times the largest value
-of its kind in the run, except those of extremes that are printed as singular or not resolved. "P1 polygon" is P1 with curved
-sides, whose error of shape no bar contains. The held-out half of the scenes has names with an odd hash: change the program by
-the other half.
+of its kind in the run, except those of extremes that are printed as singular or not resolved. The held-out half of the scenes
+has names with an odd hash: change the program by the other half.
 Writes OUT/handbook.csv, a row for each figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
 
@@ -183,7 +182,6 @@ def main():
         if not (SCENES / path.name).exists() or arguments.names and path.stem not in arguments.names:
             continue
         truth, refusals = truths(path.read_text(encoding="utf-8"))
-        curved = re.search("Circle|Ellipse", (SCENES / re.search(r'file = "(.*?)"', path.read_text())[1]).read_text())
         for mode in arguments.modes:
             refused = refusals.get("") or refusals.get(MODES[mode][0])
             out = arguments.out / f"{path.stem}-{mode}"
@@ -195,7 +193,7 @@ def main():
                 print(f"{path.stem:<22} {mode:<4} {'refused, as it should be' if good else f'WRONG: {said.strip()[-300:]}'}",
                       flush=True)
                 continue
-            new = list(rows_of(path, "P1 polygon" if curved and mode == "P1" else mode, truth, summary, out))
+            new = list(rows_of(path, mode, truth, summary, out))
             true = reached_is_true(new)
             cost = {"true": true, "seconds": round(seconds, 2), "megabytes": summary["peak_megabytes"]}
             rows += [{**row, **cost} for row in new]

@@ -2,7 +2,7 @@
 
 use super::Extremes;
 use crate::{
-    estimate::{RecoveredStrains, UNLOADED, at_vertices},
+    estimate::{RecoveredStrains, UNLOADED},
     evolution::{Outcome, RunError, RunOptions, Step, all_steps},
     mesh::Mesh,
     observe::ObservedProblem,
@@ -114,18 +114,18 @@ impl<'a> FewStepRun<'a> {
         [0, 1, 2].map(|i| gathered(self.problem, &own(i)))
     }
 
-    /// ε(u) at the end at the vertices of each triangle of this rank.
-    pub(super) fn own_strains(&self) -> Vec<[Vector3<f64>; 3]> {
+    /// ε(u) at the end at the six [`nodes`](crate::fem::Body::nodal_strains) of each triangle of this rank.
+    pub(super) fn own_strains(&self) -> Vec<[Vector3<f64>; 6]> {
         let (body, state) = (&self.problem.body, &self.outcome.last.state);
-        let strains = body.strains(&self.problem.strained(state).u);
-        strains.chunks(body.points_per_triangle()).map(at_vertices).collect()
+        let u = &self.problem.strained(state).u;
+        (0..body.triangles.len()).map(|t| body.nodal_strains(t, u)).collect()
     }
 
     /// The same for each triangle of the undivided mesh. Collective.
-    pub(super) fn strains(&self) -> Vec<[Vector3<f64>; 3]> {
+    pub(super) fn strains(&self) -> Vec<[Vector3<f64>; 6]> {
         let own = self.own_strains();
-        let mut strains = vec![[Vector3::zeros(); 3]; self.history.squares.len()];
-        for (i, component) in (0..3).flat_map(|i| (0..3).map(move |component| (i, component))) {
+        let mut strains = vec![[Vector3::zeros(); 6]; self.history.squares.len()];
+        for (i, component) in (0..6).flat_map(|i| (0..3).map(move |component| (i, component))) {
             let values = Vec::from_iter(own.iter().map(|strains| strains[i][component]));
             let values = gathered(self.problem, &values);
             strains.iter_mut().zip(values).for_each(|(of, value)| of[i][component] = value);

@@ -3,10 +3,11 @@
 use super::{Answer, FewStepRun, sizes::areas};
 use crate::{
     ROUNDING,
-    fem::Triangle,
+    estimate::mass,
+    fem::quadratic_values,
     mesh::{Mesh, Refinement},
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix6x3, Vector3};
 use std::collections::HashMap;
 
 /// Per triangle of the mesh that was bisected to `finer`: its share in the squared change ‖ζ_h − ζ_{h/2}‖² / ‖1 − ζ_{h/2}‖² at
@@ -41,8 +42,8 @@ pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec
 
 /// ‖u_h − u_{h/2}‖ / ‖u_{h/2}‖ at the end in the energy norm, with u_h on the `mesh` that was bisected to `finer`. Collective.
 ///
-/// On a triangle T, the difference e of the strains is affine: ∫ e eᵀ = |T|/12 (Σ e_i e_iᵀ + s sᵀ), with its values e_i at the
-/// vertices and their sum s.
+/// On a triangle, the difference of the strains is the quadratic function of its values at the vertices and the midpoints.
+/// Places of both meshes are compared by λ in the triangle of the `mesh`.
 pub(super) fn displacement(
     coarse: &FewStepRun,
     mesh: &Mesh,
@@ -53,25 +54,26 @@ pub(super) fn displacement(
     let (problem, comm) = (fine.problem, fine.problem.body.comm());
     let (body, elasticity) = (&problem.body, &problem.elasticity);
     let zeta = problem.zeta_at_points(&fine.outcome.last.state.zeta);
-    let per_triangle = body.points_per_triangle();
+    let (per_triangle, old) = (body.points_per_triangle(), mesh.nodes.len());
     let square = |t: usize| {
-        let parent = finer.parent_of_triangle[body.global_triangles[t]];
-        let corners = mesh.triangles[parent].map(|node| mesh.nodes[node]);
-        let gradients = *Triangle::new(corners).gradients();
-        let difference = [0, 1, 2].map(|i| {
-            let [x, y] = body.mesh.nodes[body.mesh.triangles[t][i]];
-            // The strain of the parent at this place: Σ λ_j s_j, with λ_j = 1/3 + ∇λ_j · (x − centroid).
-            let centroid = [0, 1].map(|k| corners.iter().map(|at| at[k]).sum::<f64>() / 3.0);
-            let part = |[a, b]: [f64; 2]| 1.0 / 3.0 + a * (x - centroid[0]) + b * (y - centroid[1]);
-            let strain = before[parent].iter().zip(gradients).map(|(of, g)| of * part(g));
-            after[t][i] - strain.sum::<Vector3<f64>>()
+        let triangle = body.global_triangles[t];
+        let parent = finer.parent_of_triangle[triangle];
+        let [a, b, c] = finer.mesh.triangles[triangle].map(|node| {
+            let ends = node.checked_sub(old).map_or([node; 2], |new| finer.halved_edges[new]);
+            let part = |corner| ends.iter().filter(|end| **end == corner).count() as f64 / 2.0;
+            Vector3::from(mesh.triangles[parent].map(part))
         });
-        let sum = difference.iter().sum::<Vector3<f64>>();
-        let products = difference.iter().chain([&sum]).map(|e| e * e.transpose());
+        let places = [a, b, c, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
+        let difference = [0, 1, 2, 3, 4, 5].map(|i| {
+            let values = quadratic_values(places[i].into()).into_iter().zip(before[parent]);
+            let strain = values.map(|(value, strain)| strain * value).sum::<Vector3<f64>>();
+            (after[t][i] - strain).transpose()
+        });
+        let difference = Matrix6x3::from_rows(&difference);
         let mean =
             zeta[per_triangle * t..][..per_triangle].iter().sum::<f64>() / per_triangle as f64;
-        let products = products.sum::<Matrix3<f64>>() * (mean * body.triangles[t].area() / 12.0);
-        elasticity.d(body, t).dot(&products)
+        let products = difference.transpose() * mass() * difference;
+        elasticity.d(body, t).dot(&products) * mean * body.triangles[t].area()
     };
     let square = comm.total((0..body.own_triangles).map(square).sum::<f64>());
     if square == 0.0 { 0.0 } else { (square / size).sqrt() }

@@ -182,14 +182,15 @@ pub fn adapted(
 }
 
 /// The errors of the figures of `scene` from `mesh`, measured by three runs: on the mesh and on the mesh bisected
-/// everywhere, once and twice. Their steps are few, or chosen for the error `of_steps` of ζ. Collective.
+/// everywhere, once and twice, with new nodes on the curved sides of `curved`, which has the same triangles. So the changes
+/// contain the error of shape. The steps are few, or chosen for the error `of_steps` of ζ. Collective.
 ///
 /// # Errors
 /// See [`AdaptError`].
 pub fn measured_errors(
     session: &Session,
     scene: &Scene,
-    mesh: &Mesh,
+    [mesh, curved]: [&Mesh; 2],
     run_options: &RunOptions,
     of_steps: Option<f64>,
 ) -> Result<Measured, AdaptError> {
@@ -199,13 +200,13 @@ pub fn measured_errors(
         (None, _) => with_steps(scene, INSTANTS),
     };
     let scene = if of_steps.is_none() { with_passing_loads(session, scene, mesh)? } else { scene };
-    let mesh = Refinement::start(mesh.clone()).mesh;
+    let [mesh, curved] = [mesh, curved].map(|mesh| Refinement::start(mesh.clone()).mesh);
     let mut fixed = AccuracyLoop::new(session, run_options, scene);
     loop {
         let problem = problem_on(session, &fixed.scene, &mesh)?;
         let run = fixed.solve(&problem, FEW, &[])?;
         if run.stop().is_none() || of_steps.is_some() || !fixed.make_steps_adaptive() {
-            let answer = Answer::new(&run, mesh);
+            let answer = Answer::new(&run, curved);
             return Ok(fixed.measurement(&answer, &run, None)?.result);
         }
     }

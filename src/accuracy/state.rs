@@ -20,7 +20,7 @@ pub struct LoopState {
     pub measured: Measured,
     /// Is the run a repetition with shorter steps?
     pub repeats: bool,
-    /// Notes on error bars that are missing.
+    /// Notes on error bars that are missing, and on the curves that they follow.
     pub notes: Vec<String>,
 }
 
@@ -41,7 +41,9 @@ impl LoopState {
         let saved = saved.filter(|state| state.adapted.is_some());
         let (mut state, run_options) = (saved.unwrap_or_default(), RunOptions::of(scene));
         if let (None, Some(accuracy)) = (&state.adapted, scene.accuracy) {
-            let found = adapted(session, scene, mesh.clone(), &run_options, accuracy, seen)?;
+            let (curved, notes) = mesh.on_smooth_curves();
+            state.notes.extend(notes);
+            let found = adapted(session, scene, curved, &run_options, accuracy, seen)?;
             (state.measured, state.adapted) = (found.measured.clone(), Some(found));
         }
         let Some(Adapted { mesh, steps, damage, .. }) = &state.adapted else {
@@ -72,7 +74,9 @@ impl LoopState {
             self.notes.push(note.to_owned());
             return Ok(Measured::default());
         }
-        match measured_errors(session, scene, mesh, &RunOptions::of(scene), of_steps) {
+        let (curved, notes) = mesh.on_smooth_curves();
+        self.notes.extend(notes);
+        match measured_errors(session, scene, [mesh, &curved], &RunOptions::of(scene), of_steps) {
             // The scene fits this mesh, perhaps not the finer one.
             Err(error) if error.signal().is_none() => {
                 self.notes.push(format!("the error bars could not be measured: {error}"));

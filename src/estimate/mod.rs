@@ -17,7 +17,7 @@ mod damage_errors;
 mod simulation;
 
 pub use equilibrated::{EquilibratedStress, Unproved};
-pub(crate) use recovery::at_vertices;
+pub(crate) use recovery::mass;
 pub use recovery::{EnergyError, RecoveredStrains};
 pub use simulation::Simulation;
 

@@ -29,8 +29,8 @@ impl EnergyError {
 /// midpoint the mean of the fits of both ends.
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
-    /// ε(u) at the quadrature points, `per_triangle` of them in each triangle.
-    strains: Vec<Vector3<f64>>,
+    u: &'a [f64],
+    /// The number of quadrature points in each triangle.
     per_triangle: usize,
     /// Per material: the fits of the vertices.
     fits: Vec<Fits>,
@@ -41,10 +41,10 @@ impl<'a> RecoveredStrains<'a> {
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn new(body: &'a Body, u: &[f64]) -> Result<Self, PetscError> {
-        let (patches, strains) = (body.patches(), body.strains(u));
-        let fits = patches.fits(&strains, Some(&body.vertices.partition))?;
-        Ok(Self { body, strains, per_triangle: patches.per_triangle, fits })
+    pub fn new(body: &'a Body, u: &'a [f64]) -> Result<Self, PetscError> {
+        let patches = body.patches();
+        let fits = patches.fits(&body.strains(u), Some(&body.vertices.partition))?;
+        Ok(Self { body, u, per_triangle: patches.per_triangle, fits })
     }
 
     /// Estimates the error of u in the energy norm; `zeta` is ζ at the quadrature points. Collective.
@@ -65,45 +65,28 @@ impl<'a> RecoveredStrains<'a> {
         EnergyError { squares, error: sums[0], energy: sums[1] }
     }
 
-    /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20. (ε(u) is affine
-    /// between the quadrature points, except on curved triangles.)
+    /// ε* − ε(u) on triangle `t`, at the vertices and the midpoints of the sides 01, 12, 20.
     pub(super) fn difference(&self, t: usize) -> [Vector3<f64>; 6] {
         let (body, triangle) = (self.body, self.body.mesh.triangles[t]);
         let fits = &self.fits[body.material(t)];
-        let strains = &self.strains[self.per_triangle * t..self.per_triangle * (t + 1)];
-        let computed = at_vertices(strains);
-        let at = |i: usize| body.mesh.nodes[triangle[i]];
+        let computed = body.nodal_strains(t, self.u);
         let recovered = |i: usize, [x, y]: [f64; 2]| {
-            let [vx, vy] = at(i);
+            let [vx, vy] = body.mesh.nodes[triangle[i]];
             fits.value(triangle[i], [x - vx, y - vy])
         };
-        let vertex = |i: usize| recovered(i, at(i)) - computed[i];
+        let vertex = |i: usize| recovered(i, body.mesh.nodes[triangle[i]]) - computed[i];
         let middle = |i: usize, j: usize| {
-            if let [_] = strains {
-                return 0.5 * (vertex(i) + vertex(j));
-            }
-            let x = [0, 1].map(|k| 0.5 * (at(i)[k] + at(j)[k]));
-            0.5 * (recovered(i, x) + recovered(j, x) - computed[i] - computed[j])
+            let Some(nodes) = body.quadratic_nodes() else { return 0.5 * (vertex(i) + vertex(j)) };
+            let x = body.nodes.points[nodes[t][3 + i]];
+            0.5 * (recovered(i, x) + recovered(j, x)) - computed[3 + i]
         };
         [vertex(0), vertex(1), vertex(2), middle(0, 1), middle(1, 2), middle(2, 0)]
     }
 }
 
-/// A function at the vertices from its values at the quadrature points of a triangle, constant or
-/// affine between them: an affine f has the values f(x_q) = Σf/6 + f_q/2, so f_q = 2 f(x_q) − Σf/3.
-pub(crate) fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {
-    match points {
-        [value] => [*value; 3],
-        _ => {
-            let sum = points.iter().sum::<Vector3<f64>>();
-            [0, 1, 2].map(|i| 2.0 * points[i] - sum / 3.0)
-        }
-    }
-}
-
 /// ∫ N_i N_j / |T| of the quadratic shape functions on a straight triangle: of the vertices, and of the midpoints of
 /// the sides 01, 12, 20.
-fn mass() -> Matrix6<f64> {
+pub(crate) fn mass() -> Matrix6<f64> {
     Matrix6::from_fn(|i, j| match (i.min(j), i.max(j)) {
         (i, j) if i == j => [6.0, 32.0][i / 3],
         (..3, ..3) => -1.0,

@@ -2,14 +2,15 @@
 
 use super::{
     Cells, Edge, Elements, Partition, Patches, Triangle,
-    element::{POINTS, Quadratic, quadratic_values},
+    element::{NODES, POINTS, Quadratic, QuadraturePoint, at_vertices, quadratic_values},
     for_elements,
 };
 use crate::{
+    ROUNDING,
     mesh::{Mesh, Order, sorted},
     petsc::Communicator,
 };
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rustc_hash::FxHashMap as HashMap;
 use std::{
     rc::Rc,
@@ -171,6 +172,34 @@ impl Body {
     /// The strains (ε_xx, ε_yy, 2ε_xy) of nodal u at the quadrature points of the elements, Q in turn for each triangle.
     pub fn strains(&self, u: &[f64]) -> Vec<Vector3<f64>> {
         for_elements!(self, cells => cells.strains(u, |_, strain| strain))
+    }
+
+    /// Does a side of the element of u on triangle `t` differ from its chord, beyond rounding?
+    pub fn is_curved(&self, t: usize) -> bool {
+        let bends = |nodes: &[usize; 6]| {
+            let at = |i: usize| Vector2::from(self.nodes.points[nodes[i]]);
+            let bend = |(i, j, middle)| (at(middle) - 0.5 * (at(i) + at(j))).norm();
+            let sides = [(0, 1, 3), (1, 2, 4), (2, 0, 5)];
+            sides.into_iter().any(|side| bend(side) > ROUNDING * (at(side.1) - at(side.0)).norm())
+        };
+        self.quadratic_nodes().is_some_and(|nodes| bends(&nodes[t]))
+    }
+
+    /// The strains of nodal u at the vertices of triangle `t` and at the midpoints of its sides 01, 12, 20. Between them ε(u) is
+    /// affine, and on a curved triangle of P2 quadratic up to O(h³).
+    pub fn nodal_strains(&self, t: usize, u: &[f64]) -> [Vector3<f64>; 6] {
+        match self.elements() {
+            Elements::Linear(cells) => [cells.elements[t].points[0].strain(&cells.gather(t, u)); 6],
+            Elements::Quadratic(cells) if self.is_curved(t) => {
+                let nodes = cells.nodes[t].map(|node| self.nodes.points[node]);
+                NODES.map(|at| QuadraturePoint::at(&nodes, at).strain(&cells.gather(t, u)))
+            }
+            Elements::Quadratic(cells) => {
+                let points = &cells.elements[t].points;
+                let [p, q, r] = at_vertices(&points.map(|point| point.strain(&cells.gather(t, u))));
+                [p, q, r, 0.5 * (p + q), 0.5 * (q + r), 0.5 * (r + p)]
+            }
+        }
     }
 
     /// A nodal field of ζ at the quadrature points of the elements of u, Q in turn for each triangle.

@@ -34,6 +34,28 @@ pub const POINTS: [[f64; 3]; 3] = {
     [[near, far, far], [far, near, far], [far, far, near]]
 };
 
+/// Barycentric coordinates of the six nodes of P2.
+pub(super) const NODES: [[f64; 3]; 6] = [
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [0.5, 0.5, 0.0],
+    [0.0, 0.5, 0.5],
+    [0.5, 0.0, 0.5],
+];
+
+/// A function at the vertices from its values at the quadrature points of a triangle, constant or
+/// affine between them: an affine f has the values f(x_q) = Σf/6 + f_q/2, so f_q = 2 f(x_q) − Σf/3.
+pub(crate) fn at_vertices(points: &[Vector3<f64>]) -> [Vector3<f64>; 3] {
+    match points {
+        [value] => [*value; 3],
+        _ => {
+            let sum = points.iter().sum::<Vector3<f64>>();
+            [0, 1, 2].map(|i| 2.0 * points[i] - sum / 3.0)
+        }
+    }
+}
+
 /// The values of the six P2 functions at barycentric coordinates λ: λ_i (2λ_i − 1) at the vertices and
 /// 4 λ_i λ_j at the midpoints.
 pub fn quadratic_values([a, b, c]: [f64; 3]) -> [f64; 6] {
@@ -45,21 +67,23 @@ impl Quadratic {
     /// The isoparametric element of six nodes: x = Σ x_i φ_i(λ), so that a side is a parabola through
     /// its midpoint.
     pub fn new(nodes: [[f64; 2]; 6]) -> Self {
+        Self { points: POINTS.map(|point| QuadraturePoint::at(&nodes, point)) }
+    }
+}
+
+impl QuadraturePoint<6> {
+    /// The point λ of the isoparametric element of six nodes, with the weight of one of [`POINTS`].
+    pub(super) fn at(nodes: &[[f64; 2]; 6], point: [f64; 3]) -> Self {
+        let derivatives = quadratic_derivatives(point);
+        let jacobian = jacobian(nodes, &derivatives);
+        let determinant = jacobian.determinant();
+        // J⁻ᵀ is the matrix of cofactors over the determinant.
+        let cofactors = Matrix2::new(jacobian.m22, -jacobian.m21, -jacobian.m12, jacobian.m11);
         Self {
-            points: POINTS.map(|point| {
-                let derivatives = quadratic_derivatives(point);
-                let jacobian = jacobian(&nodes, &derivatives);
-                let determinant = jacobian.determinant();
-                // J⁻ᵀ is the matrix of cofactors over the determinant.
-                let cofactors =
-                    Matrix2::new(jacobian.m22, -jacobian.m21, -jacobian.m12, jacobian.m11);
-                QuadraturePoint {
-                    weight: determinant / 6.0,
-                    gradients: derivatives.map(|[p, q]| {
-                        let [x, y] = [0, 1].map(|k| cofactors[(k, 0)] * p + cofactors[(k, 1)] * q);
-                        [x / determinant, y / determinant]
-                    }),
-                }
+            weight: determinant / 6.0,
+            gradients: derivatives.map(|[p, q]| {
+                let [x, y] = [0, 1].map(|k| cofactors[(k, 0)] * p + cofactors[(k, 1)] * q);
+                [x / determinant, y / determinant]
             }),
         }
     }

@@ -33,6 +33,7 @@ pub use damage_certificate::DamageCertificate;
 pub(crate) use edge::THREE_GAUSS;
 pub use edge::{Edge, GAUSS, gauss_points, normal_error, parabola};
 pub use elasticity::Elasticity;
+pub(crate) use element::at_vertices;
 pub use element::{Element, POINTS, QuadraturePoint, quadratic_values};
 pub use loads::{TriangleParts, add_body_force, add_traction, part_point, six_points};
 pub(crate) use location::ON_SIDE;

@@ -95,8 +95,16 @@ impl<'a> Lines<'a> {
             _ if !ends.contains(&b) => self.chord(a, b),
             [p, q] if self.is_smooth(a, [p, q]) => {
                 let other = if p == b { q } else { p };
-                let [own, opposite] = [b, other].map(|end| self.estimate(a, end).0);
-                own - opposite
+                let [(own, of_own), (opposite, of_opposite)] =
+                    [b, other].map(|end| self.estimate(a, end));
+                // Three nodes on a straight line show the tangent; the next nodes may lie behind a corner.
+                if self.are_straight(a, [p, q]) {
+                    self.chord(a, b)
+                } else if of_own + of_opposite > 0.0 {
+                    own * of_opposite - opposite * of_own
+                } else {
+                    own - opposite
+                }
             }
             _ => self.estimate(a, b).0,
         };
@@ -113,7 +121,9 @@ impl<'a> Lines<'a> {
         match self.points(a, b)[..] {
             [p, q, r] => {
                 let [tangent, farther] = [[p, q], [q, r]].map(|points| self.circle(a, points));
-                (tangent, turn(tangent, -farther))
+                // Several edges on one straight line: r may lie behind the end of this line.
+                let is_straight = turn(tangent, -self.chord(a, b)) <= SAME_DIRECTION;
+                (tangent, if is_straight { 0.0 } else { turn(tangent, -farther) })
             }
             [p, q] => {
                 let tangent = self.circle(a, [p, q]);
@@ -151,6 +161,11 @@ impl<'a> Lines<'a> {
         let &[p, q] = self.ends.get(&b)?.as_slice() else { return None };
         let goes_on = !self.mesh.points.contains(&b) && self.turns_little(b, [p, q]);
         goes_on.then_some(if p == a { q } else { p })
+    }
+
+    /// Do both edges at the node lie on a straight line?
+    fn are_straight(&self, node: usize, [p, q]: [usize; 2]) -> bool {
+        turn(self.chord(node, p), self.chord(node, q)) <= SAME_DIRECTION
     }
 
     fn turns_little(&self, node: usize, [p, q]: [usize; 2]) -> bool {

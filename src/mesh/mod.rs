@@ -22,6 +22,7 @@ mod numbering;
 mod quadratic;
 mod rectangle;
 mod refine;
+mod smooth;
 
 pub use boundary::{BoundaryFace, SAME_DIRECTION, joined_faces};
 pub use error::MeshError;

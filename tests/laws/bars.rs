@@ -9,6 +9,7 @@ use signorini::{
     petsc::Session,
     scene::Scene,
 };
+use std::f64::consts::FRAC_PI_2;
 
 /// A block that is clamped on the left, pressed on top, and rests on a foundation below.
 fn block(order: u8, more: &str, gap: &str, load: &str) -> Scene {
@@ -40,7 +41,7 @@ fn with_bars(scene: &Scene, n: usize) -> (ObservedProblem, Outcome) {
     let mut outcome = solved(scene.clone(), square(n));
     let session = Session::start(&[]).unwrap();
     let measured =
-        accuracy::measured_errors(&session, scene, &square(n), &RunOptions::of(scene), None)
+        accuracy::measured_errors(&session, scene, [&square(n); 2], &RunOptions::of(scene), None)
             .unwrap();
     outcome.set_bars(&problem, &measured).expect("PETSc works");
     (problem, outcome)
@@ -60,7 +61,7 @@ fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one(
             let bars = accuracy::measured_errors(
                 &session,
                 &scene,
-                &square(n),
+                [&square(n); 2],
                 &RunOptions::of(&scene),
                 None,
             );
@@ -77,6 +78,47 @@ fn a_figure_on_a_given_mesh_is_off_by_no_more_than_its_bar_which_is_no_idle_one(
     // By chance an error may be much smaller than those before and after it.
     idle.sort_by(f64::total_cmp);
     assert!(idle[idle.len() / 2] < 3.0, "{idle:?}");
+}
+
+/// A ring of straight triangles on a shaft that is too large by 1e-3 (Lamé): the polygon is too short and too stiff. The mesh has no
+/// geometry.
+#[test]
+fn bars_of_linear_elements_contain_the_error_of_the_polygon() {
+    let ring = scene(
+        "material = { young = 1000, poisson = 0.3, plane = 'stress' }
+         boundary = [
+            { name = 'bottom', symmetry = true },
+            { name = 'top', symmetry = true },
+            { name = 'left', gap = -0.001 },
+         ]",
+    );
+    let pressure = 1.0 / (5.0 / 3.0 + 0.3);
+    let exact = [("contact_length", FRAC_PI_2), ("contact_force", FRAC_PI_2 * pressure)];
+    let mut errors = Vec::new();
+    for n in [2, 4, 8] {
+        let mut mesh = Mesh::rectangle(1.0, 1.0, n, 2 * n);
+        for node in &mut mesh.nodes {
+            let (r, (sine, cosine)) = (1.0 + node[0], (FRAC_PI_2 * node[1]).sin_cos());
+            *node = [r * cosine, r * sine];
+        }
+        let (curved, notes) = mesh.on_smooth_curves();
+        assert!(notes.len() == 1 && notes[0].contains("no geometry"), "{notes:?}");
+        let problem = ObservedProblem::new(ring.clone(), mesh.clone()).unwrap();
+        let outcome = solved(ring.clone(), mesh.clone());
+        let session = Session::start(&[]).unwrap();
+        let options = RunOptions::of(&ring);
+        let meshes = [&mesh, &curved];
+        let bars = accuracy::measured_errors(&session, &ring, meshes, &options, None).unwrap().bars;
+        for (name, exact) in exact {
+            let found = outcome.last.figures[problem.figures.number(name).unwrap()].value;
+            let (error, bar) = ((found - exact).abs(), bar(&bars, name));
+            println!("{n}, {name}: off by {error:.2e}, bar {bar:.2e}");
+            assert!(error <= bar && bar < 4.0 * error, "{n}, {name}: off by {error:e}, bar {bar:e}");
+            errors.push(error);
+        }
+    }
+    let mut orders = errors.windows(3).map(|of| (of[0] / of[2]).log2());
+    assert!(orders.all(|order| (1.8..2.3).contains(&order)), "{errors:?}");
 }
 
 #[test]

@@ -33,4 +33,5 @@ mod malformed;
 mod numbering;
 mod reader;
 mod refine;
+mod smooth;
 mod writer;

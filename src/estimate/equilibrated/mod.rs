@@ -20,11 +20,9 @@ mod pressure;
 mod reservations;
 mod stars;
 
-use super::recovery::at_vertices;
 use crate::{
-    ROUNDING,
     evolution::ContactStep,
-    fem::{Body, for_elements},
+    fem::{Body, at_vertices, for_elements},
     mesh::{Order, sorted},
     model::Material,
     observe::ObservedProblem,
@@ -124,7 +122,7 @@ impl<'a> EquilibratedStress<'a> {
         let comm = partition.comm();
         let norm = |u: &[f64]| comm.total(elasticity.energy(body, &points, u)).max(0.0).sqrt();
         let size = norm(&problem.strained(state).u);
-        if comm.any(is_curved(body)) {
+        if comm.any((0..body.triangles.len()).any(|t| body.is_curved(t))) {
             return Ok(Err("sides are curved"));
         }
         if size <= 0.0 {
@@ -271,18 +269,6 @@ impl<'a> EquilibratedStress<'a> {
             body: triangle.body,
         }
     }
-}
-
-/// Does a side of a triangle differ from its chord?
-fn is_curved(body: &Body) -> bool {
-    let points = &body.nodes.points;
-    let bends = |nodes: &[usize; 6]| {
-        [[0, 1, 3], [1, 2, 4], [2, 0, 5]].iter().any(|side| {
-            let [a, b, middle] = side.map(|i| Vector2::from(points[nodes[i]]));
-            (middle - 0.5 * (a + b)).norm() > ROUNDING * (b - a).norm()
-        })
-    };
-    body.quadratic_nodes().is_some_and(|nodes| nodes.iter().any(bends))
 }
 
 /// The sides on the boundary with an end that this rank owns, by their ends in increasing order.

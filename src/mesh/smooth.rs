@@ -1,0 +1,62 @@
+//! Straight sides that are chords of smooth curves, as curved sides.
+//!
+//! Tangents that leave both ends of a side of length ℓ at the angles α and β to the chord, to the same side, give its middle the
+//! offset ℓ/4 (tan(α/2) + tan(β/2)): exactly for a circle, and up to O(ℓ⁴) for other curves.
+
+use super::{Lines, Mesh, SAME_DIRECTION, sorted};
+
+impl Mesh {
+    /// The mesh with midpoints of the sides that are chords of smooth curves, the boundary or the interfaces between surfaces
+    /// ([`Lines`]), so that refined sides follow these curves; the same mesh if it has curved sides already. Where a curve would
+    /// fold a triangle over, its sides stay straight. With notes on what is assumed, and on the sides that stay.
+    pub fn on_smooth_curves(&self) -> (Self, Vec<String>) {
+        let (mut mesh, surfaces) = (self.clone(), self.surfaces_of_triangles());
+        if !self.curved.is_empty() {
+            return (mesh, Vec::new());
+        }
+        let lines = Lines::new(self, |triangle| &surfaces[triangle]);
+        let sides = lines.ends.iter().flat_map(|(&a, ends)| ends.iter().map(move |&b| [a, b]));
+        let offset = |[a, b]: [usize; 2]| {
+            let ([nx, ny], length) = self.edge_normal([a, b]);
+            let angle = |[x, y]: [f64; 2]| (-x * nx - y * ny).atan2(y * nx - x * ny);
+            let [at_a, at_b] = [angle(lines.tangent(a, b)), angle(lines.tangent(b, a).map(|x| -x))];
+            let sum = (0.5 * at_a).tan() - (0.5 * at_b).tan();
+            let is_chord = at_a.abs().max(at_b.abs()) > SAME_DIRECTION;
+            is_chord.then(|| [nx, ny].map(|n| -0.25 * length * sum * n))
+        };
+        for side in sides.filter(|[a, b]| a < b) {
+            offset(side).into_iter().for_each(|offset| mesh.set_offset(side, offset));
+        }
+        let folds =
+            |mesh: &Self, t: &[usize; 3]| mesh.is_curved(*t) && !mesh.jacobian_exceeds(0.0, *t);
+        let mut folded = Vec::new();
+        while let Some(&[a, b, c]) = self.triangles.iter().find(|triangle| folds(&mesh, triangle)) {
+            for side in [[a, b], [b, c], [c, a]].map(sorted) {
+                folded.extend(mesh.curved.remove(&side).map(|_| side));
+            }
+        }
+        let stays = folded.first().map(|[a, _]| {
+            format!(
+                "{} curved sides stay straight, as at {}: their curves would fold triangles over; mesh finer there",
+                folded.len(),
+                self.place(self.nodes[*a])
+            )
+        });
+        let notes = [self.assumed(&mesh), stays];
+        (mesh, notes.into_iter().flatten().collect())
+    }
+
+    /// A note on the curved sides of a mesh without a geometry.
+    fn assumed(&self, curved: &Self) -> Option<String> {
+        let [a, _] = curved.curved.keys().next().filter(|_| self.points.is_empty())?;
+        let is_curved = |edge: &[usize; 2]| curved.curved.contains_key(&sorted(*edge));
+        let named = self.curves.iter().filter(|(_, of)| of.edges.iter().any(is_curved));
+        let names = Vec::from_iter(named.map(|(name, _)| format!("`{name}`")));
+        let at = format!("at {}", self.place(self.nodes[*a]));
+        let which = if names.is_empty() { at } else { format!("of {}", names.join(", ")) };
+        Some(format!(
+            "the mesh has no geometry: the sides {which} are taken as chords of smooth curves through their nodes; \
+             mesh at order 2 if their shape is another"
+        ))
+    }
+}
