@@ -1,18 +1,22 @@
 #!/usr/bin/python3
 """Problems with published or closed answers against the program: handbook.py [--binary FILE] [NAME…] [--modes P1 0.01 …]
+[--scenes FOLDER]
 
-A scene of handbook/ has its truth in comments, one line for each figure of summary.json:
+A scene of handbook/, or of FOLDER, has its truth in comments, one line for each figure of summary.json:
 
     # let a = 0.04                                     a name for the lines below
     # truth foundation.force_y = 3e4 * a               the exact value: Python, `math`, `root`, `integral`
     # truth D.stress_yy = 92.7e6 ± 5e4                 a published value with its own error
+    # no value: tip.stress_xx                          the stress at this probe depends on the direction, or is infinite
+    # infinite: von_mises_max                          an extreme that no mesh determines
     # refused: the mesh has 2 pieces                   the program must refuse the scene with these words
     # refused with --accuracy: turns over              the same in these modes
 
 Every scene runs with uniform triangles of the first and the second order and `--bars`, and with `--accuracy`. A bar holds
-if it covers the error and the truth's own error. "Reached" is true if no error exceeds the accuracy times the largest value
-of its kind in the run, except those of extremes that are printed as singular or not resolved. The held-out half of the scenes
-has names with an odd hash: change the program by the other half.
+if it covers the error and the truth's own error. Figures without a value have labels; a bar of one does not hold. "Reached"
+is true if no error exceeds the accuracy times the largest value of its kind in the run, except those of extremes that are
+printed as singular or not resolved. The held-out half of the scenes has names with an odd hash: change the program by the
+other half. The last table counts the finite extremes that are printed as singular or as not resolved.
 Writes OUT/handbook.csv, a row for each figure of each run. Exit code 1 if a bar or a "reached" does not hold.
 """
 
@@ -59,11 +63,15 @@ def integral(function, low, high, panels=20):
 
 
 def truths(text):
-    """The truths of a scene by figure, (value, own error), and the words of its refusals, by "" or an option."""
+    """The truths of a scene by figure, (value, own error), and the words of its refusals, by "" or an option. A figure
+    without a value has NaN."""
     names, found, refused = {**vars(math), "root": root, "integral": integral}, {}, {}
-    for word, rest in re.findall(r"^# (let|truth|refused:|refused with --accuracy:) (.*)$", text, re.MULTILINE):
+    words = "let|truth|no value:|infinite:|refused:|refused with --accuracy:"
+    for word, rest in re.findall(rf"^# ({words}) (.*)$", text, re.MULTILINE):
         name, _, value = (part.strip() for part in rest.partition("="))
-        if word.startswith("refused"):
+        if word in ("no value:", "infinite:"):
+            found[name] = [math.nan, 0.0]
+        elif word.startswith("refused"):
             refused[word.removeprefix("refused").removeprefix(" with ").rstrip(":")] = rest.strip()
         elif word == "let":
             exec(rest, names)
@@ -120,12 +128,13 @@ def rows_of(path, mode, truth, summary, out):
     held_out = hashlib.sha1(path.stem.encode()).digest()[0] % 2
     for figure, (exact, own) in truth.items():
         value, bar = given.get(figure), bars.get(figure)
+        without = math.isnan(exact)
         error = None if value is None else abs(value - exact)
-        extreme = summary["figures"].get(figure) or {}
-        unsettled = any(extreme.get(flag) is not None for flag in ("singular", "unresolved"))
+        labels = summary["figures"].get(figure) or {}
+        label = next((flag for flag in ("singular", "unresolved") if labels.get(flag) is not None), None)
         yield {"scene": path.stem, "half": "held out" if held_out else "open", "mode": mode, "figure": figure,
-               "kind": kind(figure), "value": value, "truth": exact, "own": own, "bar": bar, "error": error,
-               "scale": max(scale[figure], abs(exact)), "unsettled": unsettled,
+               "kind": "without a value" if without else kind(figure), "value": value, "truth": exact, "own": own, "bar": bar,
+               "error": error, "scale": max(scale[figure], abs(exact)), "label": label, "reason": labels.get(label),
                "holds": None if error is None or bar is None else error <= bar + own, "reached": summary.get("reached")}
 
 
@@ -134,20 +143,20 @@ def reached_is_true(rows):
     if rows[0]["reached"] is not True:
         return None
     # A value of 0 without another one of its kind has no scale; places have none.
-    rows = [row for row in rows if row["kind"] != "places" and not row["unsettled"] and
+    rows = [row for row in rows if row["kind"] not in ("places", "without a value") and not row["label"] and
             not (row["truth"] == 0 and row["error"] > 0.999 * row["scale"])]
     return all(row["error"] is not None and row["error"] <= float(row["mode"]) * row["scale"] + row["own"] for row in rows)
 
 
 def held(rows):
     """How many bars of some rows hold where the error is no rounding, and the median of bar over error."""
-    bars = [row for row in rows if row["holds"] is not None and row["error"] > ROUNDING * row["scale"]]
+    bars = [row for row in rows if row["holds"] is not None and not row["error"] <= ROUNDING * row["scale"]]
     ratios = [row["bar"] / row["error"] for row in bars if row["error"] > 10 * row["own"]]
     return f"{sum(row['holds'] for row in bars)} of {len(bars)}" + (f" ({median(ratios):.2g})" if ratios else "")
 
 
 def tables(rows):
-    """Prints the bars that hold by kind and mode, and "reached" by mode and half of the scenes."""
+    """Prints the bars that hold by kind and mode, "reached" by mode and half of the scenes, and the labels of extremes."""
     modes = grouped(rows, lambda row: row["mode"])
     print("\nBars that hold, errors of rounding left out (median of bar over error)\n")
     print(f"| kind | {' | '.join(modes)} |\n|---{'|---' * len(modes)}|")
@@ -155,11 +164,28 @@ def tables(rows):
         cells = (held([row for row in of if row["mode"] == mode]) for mode in modes)
         print(f"| {kind} | {' | '.join(cells)} |")
     print("\n| half, mode | bars hold | no bar | reached | of these true |\n|---|---|---|---|---|")
-    for head, of in grouped(rows, lambda row: f"{row['half']}, {row['mode']}").items():
+    halves = grouped(rows, lambda row: f"{row['half']}, {row['mode']}")
+    for head, of in {**halves, **{f"all, {mode}": of for mode, of in modes.items()}}.items():
         runs = {row["scene"]: row for row in of if row["reached"] is not None}
         reached = [row for row in runs.values() if row["reached"]]
         print(f"| {head} | {held(of)} | {sum(row['holds'] is None for row in of)} | {len(reached)} of {len(runs)} | "
               f"{sum(row['true'] for row in reached)} |")
+    print("\n| mode | finite extremes | singular | not resolved | infinite | with a bar | probes without a value | with a bar |")
+    print("|---|---|---|---|---|---|---|---|")
+    share = lambda of, label: f"{100 * sum(row['label'] == label for row in of) / max(len(of), 1):.1f} %"
+    with_bar = lambda of: f"{len(of)} | {sum(row['bar'] is not None for row in of)}"
+    for mode, of in modes.items():
+        extremes = [row for row in of if is_extreme(row["figure"])]
+        finite = [row for row in extremes if row["kind"] != "without a value"]
+        infinite = [row for row in extremes if row["kind"] == "without a value"]
+        points = [row for row in of if row["kind"] == "without a value" and not is_extreme(row["figure"])]
+        print(f"| {mode} | {len(finite)} | {share(finite, 'singular')} | {share(finite, 'unresolved')} | "
+              f"{with_bar(infinite)} | {with_bar(points)} |")
+
+
+def is_extreme(figure):
+    """Whether a figure is an extreme of stress or of contact pressure."""
+    return kind(figure) == "stress extremes"
 
 
 def grouped(rows, key):
@@ -173,13 +199,14 @@ def grouped(rows, key):
 def main():
     parser = parser_of(__doc__, "handbook")
     parser.add_argument("--modes", nargs="+", default=list(MODES), choices=list(MODES))
+    parser.add_argument("--scenes", type=Path, default=SCENES, help="their folder")
     parser.add_argument("names", nargs="*", help="of scenes, if not all")
     arguments = parser.parse_args()
     folder = arguments.out / "scenes"
-    shutil.copytree(SCENES, folder, dirs_exist_ok=True)
+    shutil.copytree(arguments.scenes, folder, dirs_exist_ok=True)
     rows, wrong = [], 0
     for path in sorted(folder.glob("*.toml")):
-        if not (SCENES / path.name).exists() or arguments.names and path.stem not in arguments.names:
+        if not (arguments.scenes / path.name).exists() or arguments.names and path.stem not in arguments.names:
             continue
         truth, refusals = truths(path.read_text(encoding="utf-8"))
         for mode in arguments.modes:

@@ -1,0 +1,1 @@
+../handbook/layers.geo

@@ -1,0 +1,1 @@
+../handbook/sector.geo
