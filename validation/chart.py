@@ -232,7 +232,7 @@ def draw(axes, name, rows):
     """The panel of a scene."""
     for label, series, solver, colour, marker in KINDS:
         of = [row for row in rows if (row["series"], row["solver"]) == (series, solver)]
-        axes.plot([row["seconds"] for row in of], [100 * row["error"] for row in of], marker,
+        axes.plot([row["seconds"] for row in of], [100 * row["error"] for row in of], marker=marker, ls="none",
                   color=colour, ms=9, alpha=0.85, mec="white", mew=0.7, label=label)
     members = front(rows)
     axes.step([row["seconds"] for row in members], [100 * row["error"] for row in members], where="post",
