@@ -21,8 +21,8 @@ PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-co
 PACKAGES_TEST := procps python3-scipy python3-pandas python3-nbclient python3-ipykernel python3-tqdm
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
-# GetFEM; the others are wheels in .venv-peers. scikit-sparse is CHOLMOD for scikit-fem, built from its source; from 0.5 on
-# it needs a newer SuiteSparse than that of Debian 12.
+# GetFEM; the others are wheels in .venv-peers. scikit-sparse is CHOLMOD for scikit-fem and numpy, built from its source; from
+# 0.5 on it needs a newer SuiteSparse than that of Debian 12.
 PACKAGES_PEERS := python3-getfem python3-venv python3-dev
 WHEELS_PEERS := ngsolve scikit-fem 'scikit-sparse<0.5'
 # dpkg-shlibdeps finds the packages of the libraries.

@@ -12,8 +12,8 @@ growth   time per step and peak memory up to two million unknowns
 ranks    whole runs on 1, 2 and 4 ranks with our factors (one rank: growth), with MUMPS and with PETSc's
          multigrid (gamg), these two on 4 ranks alone where the mesh is largest
 
-peers    the same work in NGSolve, scikit-fem and GetFEM (peers.py): a static contact problem, whole processes and the
-         contact solve alone, and 10 steps with damage. Whole processes include the imports of Python. Ours reads the
+peers    the same work in NGSolve, scikit-fem, GetFEM, and numpy with CHOLMOD (peers.py): a static contact problem, whole processes and the
+         contact solve alone, and 10 steps with damage, by Euler's scheme and by `bdf2`. Whole processes include the imports of Python. Ours reads the
          mesh and writes its results; the peers get arrays and write nothing
 
 k = 0.01. A step is the mean of all but the first, which makes what the others keep. Programs take turns,
@@ -248,15 +248,17 @@ def ranks(bench, quick):
 
 def beside_peers(bench, quick):
     """What users would pick instead: a static problem whose contact has to be found (the foundation is flat, the square
-    is pulled and pressed down), and steps of `square-mild`."""
-    programs = [OURS, *installed()]
-    scene = {key: value for key, value in read_scene(ROOT / "geo" / "square-mild.toml").items()
-             if key not in ("damage", "time")}
+    is pulled and pressed down), and steps of `square-mild` by Euler's scheme and by the default one."""
+    programs, mild = [OURS, *installed()], read_scene(ROOT / "geo" / "square-mild.toml")
+    scene = {key: value for key, value in mild.items() if key not in ("damage", "time")}
     scene["boundary"] = [{**of, "traction": ["1", "-1"]} if "traction" in of else of for of in scene["boundary"]]
     for n in (64,) if quick else (64, 128, 256):
         mesh = bench.mesh("", "square", n)
         write_scene({**scene, "mesh": {"file": str(mesh)}}, bench.out / "static.toml")
-        for work, name, steps in (("static", bench.out / "static", 0), ("damage", "square-mild", SHORT)):
+        by_bdf2 = {**mild, "mesh": {"file": str(mesh)}, "time": {**mild["time"], "scheme": "bdf2"}}
+        write_scene(by_bdf2, bench.out / "bdf2.toml")
+        for work, name, steps in (("static", bench.out / "static", 0), ("damage", "square-mild", SHORT),
+                                  ("damage, bdf2", bench.out / "bdf2", SHORT)):
             write_problem(bench.out / "problem.npz", ROOT / "geo" / f"{name}.toml", mesh, steps)
             found = {program: [] for program in programs}
             for program in programs * (1 if quick else 3):
