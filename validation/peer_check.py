@@ -4,7 +4,7 @@
 Each scene (by default all of geo/) is solved with linear displacements on a coarse mesh: static, and with damage in N
 uniform steps by Euler's scheme and by `bdf2`. Prints the largest differences of u, of ζ and of the work of the loads;
 those of u and of the work are relative. Names each peer that cannot follow a scene, with the reason. Exit code 1 if a
-difference exceeds 1e-8.
+difference exceeds 1e-8 or a peer fails.
 """
 
 import json
@@ -24,6 +24,10 @@ from signorini_results import load
 SAME = 1e-8
 
 
+class Failure(Exception):
+    """A peer fails on a scene that it should follow; the message has one line."""
+
+
 def works(scene, steps):
     """The static problem of a scene at t = 1 and its evolutions, with names."""
     mesh = {"file": scene["mesh"]["file"], **({"size": scene["mesh"]["size"]} if "size" in scene["mesh"] else {})}
@@ -34,10 +38,11 @@ def works(scene, steps):
 
 
 def started(words):
-    """The output of a command; a SceneError with the last line if it fails."""
+    """The output of a command. A SceneError has the last line of its refusal, a Failure that of its traceback."""
     done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
     if done.returncode:
-        raise SceneError((done.stderr.strip() or "it failed").splitlines()[-1])
+        kind = Failure if "Traceback" in done.stderr else SceneError
+        raise kind((done.stderr.strip() or "it failed").splitlines()[-1])
     return done.stdout
 
 
@@ -49,10 +54,11 @@ def differences(peer, folder, ours):
     points, node = np.load(folder / "problem.npz")["points"], np.empty(len(frame.points), int)
     node[np.lexsort(points.T)] = np.lexsort(frame.points.T)
     if theirs["steps"] != steps:
-        raise SceneError(f"it makes {theirs['steps']} steps and signorini {steps}")
+        raise Failure(f"it makes {theirs['steps']} steps and signorini {steps}")
     u, work = frame.field("displacement")[node, :2], ours.figures["work"]["value"]
-    return (np.abs(fields["u"] - u).max() / np.abs(u).max(), np.abs(fields["zeta"] - frame.field("zeta")[node]).max(),
-            abs(theirs["work"] - work) / abs(work))
+    # An answer that is 0 has no scale.
+    return (np.abs(fields["u"] - u).max() / (np.abs(u).max() or 1.0),
+            np.abs(fields["zeta"] - frame.field("zeta")[node]).max(), abs(theirs["work"] - work) / (abs(work) or 1.0))
 
 
 def main():
@@ -77,7 +83,12 @@ def main():
                     except SceneError as error:
                         print(f"{name} is left out: {error}", flush=True)
                         continue
-                    wrong = bool(max(u, zeta, of_loads) > SAME)
+                    except Failure as failure:
+                        failed = True
+                        print(f"{name} FAILS: {failure}", flush=True)
+                        continue
+                    # NaN is not the same either.
+                    wrong = not all(of <= SAME for of in (u, zeta, of_loads))
                     failed |= wrong
                     print(f"{name}: u {u:.0e}, ζ {zeta:.0e}, work {of_loads:.0e}{', DIFFERENT' * wrong}", flush=True)
     return failed

@@ -82,7 +82,7 @@ def bounded(r, room):
         free, w = ~p.active, room.copy()
         S = kept["S"][free]
         w[free] = np.linalg.solve(S[:, free], g[free] - S[:, p.active] @ room[p.active])
-        if p.stays(g - kept["S"] @ w, w - room, np.abs(r).max(), np.abs(w).max() + np.abs(room).max()):
+        if p.stays(g - kept["S"] @ w, w - room, np.abs(r).max(), np.abs([w, room]).max(initial=0.0)):
             return expand(y, w)
 
 
