@@ -77,6 +77,15 @@ impl<'a> FewStepRun<'a> {
         self.outcome.stopped.as_ref().map(|stop| stop.time)
     }
 
+    /// Do the errors of the time steps leave open whether ζ_* is reached before the end of the scene?
+    pub(super) fn is_undecided(&self) -> bool {
+        let end = self.problem.scene().time.map_or(f64::INFINITY, |grid| grid.end);
+        match self.outcome.stopped {
+            Some(stop) => stop.time + stop.uncertainty > end,
+            None => self.outcome.may_stop.is_some(),
+        }
+    }
+
     /// max (ζ₀ − ζ) at the end and its mean over the body; 0 if ζ_* was reached. Collective.
     pub(super) fn damage(&self) -> [f64; 2] {
         if self.outcome.stopped.is_some() {

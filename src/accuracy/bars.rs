@@ -70,8 +70,9 @@ impl Outcome {
             let (of_steps, left) = (of_both - of_mesh, accuracy - of_mesh);
             if of_steps > left { AIM * left / of_steps } else { 1.0 }
         });
-        // The time steps alone may cause a stop that no run has measured.
-        let limit = if self.stopped.is_some() && measured.stop.is_none() { 0.5 } else { 1.0 };
+        // The time steps alone may cause a stop that no run has measured, or prevent one.
+        let unmeasured = self.stopped.is_some() && measured.stop.is_none();
+        let limit = if unmeasured || self.may_stop.is_some() { 0.5 } else { 1.0 };
         let factor = factor.fold(limit, f64::min);
         (0.0 < factor && factor < 1.0).then_some(factor.max(1.0 / 64.0))
     }

@@ -73,10 +73,14 @@ impl LoopState {
         let unconfirmed = unconfirmed
             .then_some("only this run stops at ζ_*, not the runs that measure its errors");
         // Only the limit on the time prevents a repetition.
-        let is_last = self.repeats || outcome.shorter_steps(problem, &self.measured).is_none();
+        let is_last = self.is_last(outcome, accuracy)
+            || outcome.shorter_steps(problem, &self.measured).is_none();
         let limit = (!is_last)
             .then_some("a repetition with shorter steps would take longer than --max-seconds");
-        let of_run = [unconfirmed, limit].into_iter().flatten().map(str::to_owned);
+        let may_stop = outcome
+            .may_stop
+            .map(|_| "within the error of the time steps, ζ_* may have been reached");
+        let of_run = [unconfirmed, may_stop, limit].into_iter().flatten().map(str::to_owned);
         let of_mesh = missed.into_iter().chain(adapted.not_reached.clone());
         of_mesh.chain(of_run).chain(self.missing_bars(outcome)).collect()
     }

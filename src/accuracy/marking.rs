@@ -128,7 +128,8 @@ impl<'a> Estimate<'a> {
                 .and(measured)
                 .map(|of| of.result.damage.unwrap_or(0.0)),
             damage: self.run.damage(),
-            steps: MAX_SHARE_OF_STEPS * self.accuracy,
+            // The steps of this run may be what it takes to reach ζ_* or not.
+            steps: (MAX_SHARE_OF_STEPS * self.accuracy).min(self.scene().step_tolerance()),
             measured: measured.map_or_else(Measured::default, |of| of.result.clone()),
             worst: measured.and_then(worst),
             not_reached: end.filter(|end| **end != End::Reached).map(End::to_string),

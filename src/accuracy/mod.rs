@@ -150,6 +150,10 @@ const FEW_STEP_TOLERANCE: f64 = 0.05;
 /// contact and damage differ too much from those of the last mesh.
 const MESH_FOR_STEPS: f64 = 0.1;
 
+/// The smallest tolerance of time steps that is tried, as a fraction of the first one: there are about four times as many
+/// steps then.
+const SHORTEST_STEPS: f64 = 1.0 / 64.0;
+
 /// Refines `mesh` until the measured errors in a run of `scene` are at most `accuracy`: the errors of the figures,
 /// of u (energy norm) and of the damage. If the run ends at ζ_*, only the errors of u and of this time count. The
 /// caller controls the errors of the time steps. `seen` is called with each mesh and its errors. If a run on a
@@ -205,7 +209,7 @@ pub fn measured_errors(
     loop {
         let problem = problem_on(session, &fixed.scene, &mesh)?;
         let run = fixed.solve(&problem, FEW, &[])?;
-        if run.stop().is_none() || of_steps.is_some() || !fixed.make_steps_adaptive() {
+        if of_steps.is_some() || !fixed.shorten_steps(&run) {
             let answer = Answer::new(&run, curved);
             return Ok(fixed.measurement(&answer, &run, None)?.result);
         }
@@ -246,7 +250,7 @@ impl<'a> AccuracyLoop<'a> {
             let problem = problem_on(self.session, &self.scene, &refinement.mesh)?;
             // SOLVE
             let run = self.solve(&problem, INSTANTS, &[])?;
-            if run.stop().is_some() && self.make_steps_adaptive() {
+            if self.shorten_steps(&run) {
                 self.before.clear();
                 continue;
             }
@@ -331,13 +335,17 @@ impl<'a> AccuracyLoop<'a> {
         limit.map_or(Ok(finer), |limit| Err(End::Limit(limit)))
     }
 
-    /// Makes the steps adaptive: too long steps may reach ζ_* or miss loads. False if they are adaptive already.
-    fn make_steps_adaptive(&mut self) -> bool {
-        let Some(Stepping::Uniform { .. }) = self.scene.time.map(|grid| grid.stepping) else {
-            return false;
-        };
-        self.scene = with_tolerance(self.scene.clone(), FEW_STEP_TOLERANCE);
-        true
+    /// Makes the steps adaptive, and then ever shorter, if too long steps may be the reason why this `run` reaches ζ_* or does
+    /// not. False if the steps stay.
+    fn shorten_steps(&mut self, run: &FewStepRun) -> bool {
+        let now = self.scene.step_tolerance();
+        let is_open = run.is_undecided() || (now.is_infinite() && run.stop().is_some());
+        if is_open && now > SHORTEST_STEPS * FEW_STEP_TOLERANCE {
+            let shorter = FEW_STEP_TOLERANCE.min(0.25 * now);
+            self.scene = with_tolerance(self.scene.clone(), shorter);
+            return true;
+        }
+        false
     }
 
     /// Sets the tolerance of the time steps of an adapted mesh by runs on one of the meshes before: the errors of the time steps
@@ -355,7 +363,7 @@ impl<'a> AccuracyLoop<'a> {
         let mut problem = problem_on(self.session, &self.scene, mesh)?;
         let mut steps = tolerance;
         // If the mesh uses nearly the whole accuracy, the tolerance would become ever smaller.
-        while steps >= tolerance / 64.0 {
+        while steps >= SHORTEST_STEPS * tolerance {
             problem.set_step_tolerance(steps);
             let run = Simulation::new(&problem).run_options(self.run_options).run(self.session);
             let Ok(mut outcome) = run else { return Ok(()) };

@@ -1,6 +1,6 @@
 //! The state of the accuracy loop of a run: the mesh, the measured errors, and whether the run is repeated.
 
-use super::{AdaptError, Adapted, Measured, adapted, measured_errors};
+use super::{AdaptError, Adapted, Measured, SHORTEST_STEPS, adapted, measured_errors};
 use crate::{
     advice::locks,
     evolution::{Outcome, RunOptions},
@@ -87,8 +87,8 @@ impl LoopState {
     }
 
     /// The factor for the tolerance of the time steps of a repetition of the run of `problem` with this `outcome`. `None` if there
-    /// is none: its time steps are short enough, it is a repetition itself, or there is no time, with the seconds `passed` since
-    /// the start and those of the run.
+    /// is none: its time steps are short enough, [`Self::is_last`] is true, or there is no time, with the seconds `passed`
+    /// since the start and those of the run.
     pub fn shorter_steps(
         &self,
         problem: &ObservedProblem,
@@ -97,8 +97,9 @@ impl LoopState {
     ) -> Option<f64> {
         // Lengths of steps are on a ladder of √2, and their errors are of second order: an error may be twice the one
         // asked for.
-        let ratio =
-            0.5 * outcome.shorter_steps(problem, &self.measured).filter(|_| !self.repeats)?;
+        let accuracy = problem.scene().accuracy?;
+        let ratio = outcome.shorter_steps(problem, &self.measured);
+        let ratio = 0.5 * ratio.filter(|_| !self.is_last(outcome, accuracy))?;
         let most = problem.scene().max_seconds.unwrap_or(f64::INFINITY);
         (passed + seconds / ratio.sqrt() <= most).then_some(ratio)
     }
@@ -129,6 +130,13 @@ impl LoopState {
             problem.set_step_tolerance(adapted.steps);
         }
         Ok(())
+    }
+
+    /// Is no repetition of a run with this `outcome` possible? A run that stops is repeated once, and another one while the
+    /// tolerance of its steps is not very much below the `accuracy`.
+    pub(super) fn is_last(&self, outcome: &Outcome, accuracy: f64) -> bool {
+        let is_short = |of: &Adapted| of.steps < SHORTEST_STEPS * accuracy;
+        self.repeats && (outcome.stopped.is_some() || self.adapted.as_ref().is_none_or(is_short))
     }
 
     /// Did the run stop at ζ_*, but not the runs that measured the errors of the mesh? The time steps may cause the stop.

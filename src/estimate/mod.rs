@@ -35,7 +35,7 @@ pub(crate) const UNLOADED: f64 = 0.01;
 /// Estimates the errors of a finished run, with a proved bound on that of u if it is `asked`, and enters them in its outcome.
 /// Collective.
 fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
-    let Run { mut damage_step, mut contact_step, mut controller, mut outcome } = run;
+    let Run { mut contact_step, controller, mut outcome, .. } = run;
     let problem = contact_step.problem;
     outcome.accuracy = stage("accuracy", || contact_step.accuracy(&outcome))?;
     outcome.accuracy.energy = stage("accuracy", || energy_error(problem, &outcome))?;
@@ -52,7 +52,8 @@ fn estimated(run: Run, asked: bool) -> Result<Outcome, RunError> {
     });
     let is_known = problem.damage().is_some()
         && outcome.stopped.is_none()
-        && controller.add_last_error(&mut damage_step).is_ok();
+        && outcome.may_stop.is_none()
+        && outcome.last.record.step > 0;
     let last = &outcome.last.state;
     let caused = |error: &DVector<f64>| displacement_error_of(problem, error.as_slice(), last);
     let error = is_known.then(|| controller.step_error());

@@ -26,15 +26,15 @@
 //! | `contact/solvers/tao.rs` | the unit of displacements, and the centre of the proximal term | a body that contact alone supports |
 //! | `linear/linear_solver.rs` | the factor: a new one of the present K | damage that has grown since the factor was made |
 //! | `accuracy/first_mesh.rs` | the size of the first mesh | curved sides of a hole that fold coarse triangles |
-mod accuracy;
+mod solver_error;
 mod certificate;
 mod decision;
 mod minimisation;
 mod one_of_many;
 mod reference;
 
-pub use accuracy::Accuracy;
 use certificate::active_bounds;
+pub use solver_error::Accuracy;
 
 use super::{
     DiscreteProblem, LoadCase, ObservedProblem, RunError, RunOptions, State, Step, StepFailure,
@@ -240,6 +240,7 @@ impl<'a> ContactStep<'a> {
         let unconstrained = self.unconstrained_motion(&contact, force);
         let u = next.reference.total(u);
         self.next = next;
+        let reactions = -problem.body.nodes.partition.dot(&unbalanced, &u, 2);
         let mut state = State { time, u, zeta: zeta.to_vec(), contact, prescribed };
         state.prescribed = problem.pressed(&state, &unbalanced, rounding);
         let (observation, figures) =
@@ -258,6 +259,7 @@ impl<'a> ContactStep<'a> {
             governing: Vec::new(),
             forces,
             report,
+            prescribed_share: prescribed_share(observation.work, reactions, problem.tolerance),
             unconstrained,
             skipped_damage_solve: false,
         })
@@ -350,4 +352,16 @@ impl<'a> ContactStep<'a> {
         let DiscreteProblem { motions, body, constraints, .. } = &**self.problem;
         reference.add(constraints, &motions.combined(body, amplitudes).field(body));
     }
+}
+
+/// The share of the strain energy that prescribed displacements and gaps cause, from the works of the `loads` and of the
+/// `reactions` in the present state, N m per metre of thickness.
+///
+/// u = u_f + u_D, by the loads f and by the prescribed values, which do not work on each other's displacements:
+/// fᵀu = ‖u_f‖² + fᵀu_D, ‖u‖² = ‖u_f‖² + ‖u_D‖² = fᵀu + rᵀu. If fᵀu_D = 0, the share ‖u_D‖²/‖u‖² is rᵀu/‖u‖². If one of the
+/// works is negative, as when supports move a loaded body rigidly, or if the reactions work only by the `tolerance` of the solve,
+/// the share is 0: errors of ζ grow most then.
+fn prescribed_share(loads: f64, reactions: f64, tolerance: f64) -> f64 {
+    let share = reactions / (loads + reactions);
+    if loads >= 0.0 && share > Accuracy::promised(tolerance) { share.min(1.0) } else { 0.0 }
 }

@@ -1,6 +1,6 @@
 //! The damage step (28): ζ_n from ζ_{n−1} and u_{n−1}.
 
-use super::{DiscreteProblem, RunError, Step, StepFailure, agreed};
+use super::{DiscreteProblem, RunError, State, Step, StepFailure, agreed};
 use crate::{
     fem::{self, DamageCertificate, DamageSystem},
     linear::FactorState,
@@ -58,6 +58,9 @@ pub(crate) struct SourceLoad {
     pub(crate) load: DVector<f64>,
     /// min φ ≤ 0, 1/s.
     pub(crate) min: f64,
+    /// The [share](Step::prescribed_share) of prescribed displacements and gaps in the strain energy, and twice this
+    /// energy, spread over the vertices, N m per metre of thickness; empty if the share is 0.
+    pub(crate) prescribed: (f64, Vec<f64>),
 }
 
 pub(crate) struct DamageUpdate {
@@ -82,7 +85,8 @@ impl DamageStep<'_> {
         let (problem, body) = (self.problem, &self.problem.body);
         let (strains, state) = (mem::take(&mut step.strains), &step.state);
         let Some(laws) = problem.damage() else {
-            return Ok(SourceLoad { load: DVector::zeros(state.zeta.len()), min: 0.0 });
+            let load = DVector::zeros(state.zeta.len());
+            return Ok(SourceLoad { load, ..SourceLoad::default() });
         };
         stage("damage source", || {
             let comm = body.comm();
@@ -97,7 +101,9 @@ impl DamageStep<'_> {
             let min = phi.iter().fold([0.0; 3], |min, phi| [0, 1, 2].map(|q| phi[q].min(min[q])));
             let min = comm.min(min.into_iter().fold(0.0, f64::min));
             let load = fem::source_load(body, problem.mass(), &phi);
-            Ok(SourceLoad { load: DVector::from_vec(load), min })
+            let share = step.prescribed_share;
+            let energies = if share > 0.0 { energies(problem, state) } else { Vec::new() };
+            Ok(SourceLoad { load: DVector::from_vec(load), min, prescribed: (share, energies) })
         })
     }
 
@@ -211,4 +217,17 @@ impl DamageStep<'_> {
         }
         Ok(&mut self.system.insert((k, system)).1)
     }
+}
+
+/// Twice the strain energy of the triangles of this rank, in equal parts at their vertices, N m per metre of thickness.
+fn energies(problem: &DiscreteProblem, state: &State) -> Vec<f64> {
+    let (body, mut at_vertices) = (&problem.body, vec![0.0; state.zeta.len()]);
+    let zeta = problem.zeta_at_points(&state.zeta);
+    let energies = problem.elasticity.energies(body, &zeta, &state.u);
+    let of_triangles = energies.chunks(body.points_per_triangle()).take(body.own_triangles);
+    for (nodes, energies) in body.mesh.triangles.iter().zip(of_triangles) {
+        let part = energies.iter().sum::<f64>() / 3.0;
+        nodes.iter().for_each(|&node| at_vertices[node] += part);
+    }
+    at_vertices
 }

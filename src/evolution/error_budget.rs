@@ -1,4 +1,4 @@
-//! The error budget of a run: the errors of the mesh, the time steps and the solver.
+//! The errors of the last state by their causes, the mesh, the time steps and the solver, and the lines that report them.
 
 use super::Stop;
 use nalgebra::DVector;

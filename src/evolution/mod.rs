@@ -110,6 +110,7 @@ pub(crate) fn all_steps<'a>(
     run.contact_step.check_scales(&run.outcome.last)?;
     run.outcome.bound_violation = run.controller.violation();
     run.outcome.damage_error = run.controller.damage_error();
+    run.outcome.may_stop = run.controller.may_stop().filter(|_| run.outcome.stopped.is_none());
     Ok(run)
 }
 

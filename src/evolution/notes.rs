@@ -35,6 +35,13 @@ impl Outcome {
                     "ζ_* was reached too early or wrongly: the sources allow no ζ below {least:.4}"
                 )
             }),
+            self.may_stop.map(|time| {
+                format!(
+                    "the time steps are too long: within their error, ζ_* may have been reached at t = {}, and the error of \
+                     the figures is unknown; set a smaller time.step or time.tolerance",
+                    rounded(time)
+                )
+            }),
             self.bound_violation
                 .note(problem.mass(), slowest_diffusion(&problem.body, &problem.diffusions())),
             self.unconstrained.as_ref().map(|(steps, times, motion)| {

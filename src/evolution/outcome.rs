@@ -48,6 +48,10 @@ pub struct Outcome {
     /// With adaptive steps: the estimated error of the last ζ from the time steps, relative to the damage done.
     #[serde(skip)]
     pub damage_error: Option<f64>,
+    /// The time at which ζ may have reached ζ_*, within its error from the time steps, in a run that did not stop, s. The errors
+    /// after it are unknown.
+    #[serde(skip)]
+    pub may_stop: Option<f64>,
     /// The step with the largest stationarity residual before the last step.
     pub(super) least_accurate: Option<Rc<Step>>,
     /// The step with the largest displacement before the last step.
@@ -64,7 +68,8 @@ pub struct Stop {
     /// The smallest ζ that the sources so far allow. If it is above ζ_*, the stop is too early.
     pub least_admissible: f64,
     /// The error bar of the time from the steps, s: the length of the last step, or with adaptive steps the error of the
-    /// interpolation in it, plus the delay by the estimated error of ζ, which Euler's steps count twice.
+    /// interpolation in it, plus the delay by the error of ζ. If its lower bound
+    /// reached ζ_* before, the time since then plus the last step.
     pub uncertainty: f64,
     /// The measured error bar of the time from the mesh, s; `None` if it is not measured.
     pub from_mesh: Option<f64>,

@@ -28,6 +28,9 @@ pub struct Step {
     /// The strains at the quadrature points, until the damage source takes them.
     #[serde(skip)]
     pub(super) strains: Vec<Vector3<f64>>,
+    /// The share of the strain energy that prescribed displacements and gaps cause, in [0, 1]; loads cause the rest.
+    #[serde(skip)]
+    pub(super) prescribed_share: f64,
     /// A rigid motion that the active nodes leave unconstrained, if there is one.
     pub unconstrained: Option<RigidMotion>,
     /// Was the damage solve skipped?

@@ -28,11 +28,11 @@ pub trait DamageSource {
         std::any::type_name::<Self>()
     }
 
-    /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ, for ζ′ = `rate`. The errors of the
-    /// time steps follow from it. The default, [`DamageLaw::error_growth`], holds for every
+    /// The change of the source from φ = `source` < 0, 1/s, if ζ changes from the first to the second value of `zeta` and
+    /// |ε|² by the factor `stretch`. The errors of the time steps grow by it. The default, [`DamageLaw::source_change`], holds for every
     /// φ = −(λ_D (1 − ζ)/ζ + Ψ(ε) − λ_W)₊ with a quadratic Ψ.
-    fn error_growth(&self, law: &DamageLaw, zeta: f64, rate: f64) -> f64 {
-        law.error_growth(zeta, rate)
+    fn source_change(&self, law: &DamageLaw, source: f64, zeta: [f64; 2], stretch: f64) -> f64 {
+        law.source_change(source, zeta, stretch)
     }
 }
 
@@ -66,10 +66,10 @@ impl DamageSource for ChosenSource {
         }
     }
 
-    fn error_growth(&self, law: &DamageLaw, zeta: f64, rate: f64) -> f64 {
+    fn source_change(&self, law: &DamageLaw, source: f64, zeta: [f64; 2], stretch: f64) -> f64 {
         match self {
-            Self::Fremond => Fremond.error_growth(law, zeta, rate),
-            Self::Own(source) => source.error_growth(law, zeta, rate),
+            Self::Fremond => Fremond.source_change(law, source, zeta, stretch),
+            Self::Own(own) => own.source_change(law, source, zeta, stretch),
         }
     }
 
@@ -109,15 +109,13 @@ impl DamageLaw {
         -rate.max(0.0)
     }
 
-    /// The growth rate g of a small error of ζ under a given load, 1/s: (δζ)′ = g δζ. `rate` is ζ′ = φ.
-    ///
-    /// An error δζ changes φ by λ_D/ζ² δζ. As |ε| is proportional to 1/ζ, it also changes ½ λ_U |ε|², which is
-    /// −φ − λ_D (1−ζ)/ζ + λ_W, by the factor −2 δζ/ζ. The sum of both changes of φ is g δζ.
-    pub fn error_growth(&self, zeta: f64, rate: f64) -> f64 {
-        let zeta = self.truncate(zeta);
-        let internal = self.lambda_d * (1.0 - zeta) / zeta;
-        let external = (self.lambda_w - rate - internal).max(0.0);
-        self.lambda_d / (zeta * zeta) + 2.0 * external / zeta
+    /// The change of the source from φ = `source` < 0, 1/s, if ζ changes from the first to the second value and
+    /// Ψ becomes `stretch` Ψ. It follows from ½ λ_U Ψ = λ_W − φ − λ_D (1−ζ)/ζ.
+    pub fn source_change(&self, source: f64, [from, to]: [f64; 2], stretch: f64) -> f64 {
+        let internal = [from, to].map(|zeta| self.lambda_d * (1.0 - zeta) / zeta);
+        let external = (self.lambda_w - source - internal[0]).max(0.0);
+        let changed = internal[1] + stretch * external - self.lambda_w;
+        (internal[0] + external - self.lambda_w) - changed.max(0.0)
     }
 
     /// η_*(ζ): ζ cut to [ζ_*, 1].

@@ -183,6 +183,14 @@ impl Scene {
         if self.time.is_some() { 0.0 } else { 1.0 }
     }
 
+    /// The tolerance of adaptive time steps; infinite for others.
+    pub fn step_tolerance(&self) -> f64 {
+        match self.time.map(|grid| grid.stepping) {
+            Some(Stepping::Auto { tolerance, .. }) => tolerance,
+            _ => f64::INFINITY,
+        }
+    }
+
     /// The numbers and names of the materials with these `numbers`; 0 is `material`.
     pub(crate) fn materials_in(&self, numbers: &[u32]) -> Vec<(usize, String)> {
         let names = iter::once("material").chain(self.surfaces.keys().map(String::as_str));

@@ -18,11 +18,12 @@ fn uniform(damage: &str, boundary: &str) -> ObservedProblem {
 
 /// The same in other steps.
 fn stepped(damage: &str, boundary: &str, stepping: &str) -> ObservedProblem {
+    let end = if stepping.contains("end") { "" } else { "end = 1, " };
     let text = format!(
         "material = {{ young = 100, poisson = 0, plane = 'stress' }}
          damage = {{ diffusion = 1, strain_cap = 1000, threshold = 0.01,
                      initial = 1, {damage} }}
-         time = {{ end = 1, {stepping} }}
+         time = {{ {end}{stepping} }}
          boundary = [
             {{ name = 'left', symmetry = true }},
             {{ name = 'bottom', symmetry = true }},
@@ -167,6 +168,78 @@ fn bars_hold_for_strains_that_rise_fall_and_jump() {
     // Some errors cancel.
     ratios.sort_by(f64::total_cmp);
     assert!(ratios[ratios.len() / 2] < 8.0, "{ratios:?}");
+}
+
+/// Errors of early steps grow in later ones: by λ_D, and under a force, which strains a weaker body more. The growth does not
+/// depend on whether the load rises or fades. The load factors are chosen for ζ(1) = ½.
+#[test]
+fn bars_hold_where_early_errors_grow() {
+    type Load = fn(f64) -> f64;
+    // ½ λ_U ε² = c s(t)², or c (s(t)/ζ)² under a force, with c for λ_D = 3 and a strain, and for λ_D = 0 and 1 and a force.
+    let loads: [(&str, Load, [f64; 3]); 4] = [
+        ("t", |t| t, [0.4336, 0.8752, 0.6738]),
+        ("(1-t)^2", |t| (1.0 - t).powi(2), [0.1187, 1.4583, 0.6493]),
+        ("1-exp(-12*t)", |t| 1.0 - (-12.0 * t).exp(), [0.0754, 0.3333, 0.2105]),
+        ("sin(pi*t)", |t| (PI * t).sin(), [0.1273, 0.5834, 0.3566]),
+    ];
+    let steppings = [
+        "step = 0.02, scheme = 'euler'",
+        "step = 0.05, scheme = 'euler'",
+        "step = 0.05, scheme = 'bdf2'",
+        "step = 0.02, scheme = 'bdf2'",
+        "step = 'auto', tolerance = 0.03",
+    ];
+    let mut ratios = Vec::new();
+    for (load, size, factors) in loads {
+        for (i, (lambda_d, power)) in [(3.0, 0), (0.0, 2), (1.0, 2)].into_iter().enumerate() {
+            let c = factors[i];
+            let exact = integrated(|t, z| {
+                -(lambda_d * (1.0 - z) / z + c * size(t).powi(2) / z.powi(power))
+            });
+            let boundary = match power {
+                0 => stretched(&format!("0.01*({load})")),
+                _ => format!("{{ name = 'right', traction = ['{load}', 0] }}"),
+            };
+            let damage = format!("lambda_d = {lambda_d}, lambda_u = {}", 2e4 * c);
+            for stepping in steppings {
+                let outcome = with_bars(&stepped(&damage, &boundary, stepping)).0;
+                let error = (outcome.last.record.zeta_min - exact).abs();
+                let bar = outcome.bars.iter().find(|bar| bar.name == "zeta_min");
+                println!(
+                    "{load}, {damage}, {stepping}: off by {error:.1e}, bar {:?}",
+                    bar.map(|of| of.bar)
+                );
+                // Euler's few steps may leave the error unknown, never those of second order.
+                match bar {
+                    Some(bar) => assert!(error <= bar.bar, "{load}, {damage}, {stepping}"),
+                    None => assert!(stepping.contains("euler") && outcome.may_stop.is_some()),
+                }
+                ratios.extend(bar.map(|bar| bar.bar / error));
+            }
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios[ratios.len() / 2];
+    assert!(ratios.len() > 50 && median < 3.0, "{} bars, median {median}", ratios.len());
+}
+
+/// ζ' = −(3 (1 − ζ)/ζ + 0.1) reaches ζ_* at t = 0.868. Euler's long steps have not noticed by then, but their error shows that
+/// they may have missed it.
+#[test]
+fn a_run_that_may_have_missed_the_end_of_the_body_says_so() {
+    for end in [0.84, 0.9] {
+        let problem = stepped(
+            "lambda_d = 3, lambda_u = 20",
+            &stretched("0.1"),
+            &format!("end = {end}, step = {}, scheme = 'euler'", end / 9.0),
+        );
+        let outcome = run(&problem, SOLVERS[0]);
+        assert!(outcome.stopped.is_none());
+        let time = outcome.may_stop.expect("the error exceeds ζ − ζ_*");
+        assert!(0.3 < time && time <= end && outcome.errors.damage_steps.is_none(), "{time}");
+        let notes = outcome.notes(&problem);
+        assert!(notes.iter().any(|note| note.contains("ζ_* may have been reached")), "{notes:?}");
+    }
 }
 
 /// A growing stress σ until 0.95 of the body's life: ζ³ = 1 − 0.95 t³, u = σ/(Eζ). Runs with few steps lag behind: they end in a

@@ -2,8 +2,8 @@
 
 use super::{
     AcceptedState, ContactStep,
-    accuracy::{Accuracy, MAX_ROUNDING},
     certificate::Candidate,
+    solver_error::{Accuracy, MAX_ROUNDING},
 };
 use crate::{
     contact::{ContactError, ContactOptions, ContactReport},

@@ -42,7 +42,7 @@ const LONGEST_STEP: f64 = 0.05;
 ///
 /// Tuned on the 13 adapted runs. Half: nothing changes. Twice: nothing changes.
 const FOLLOWING: f64 = 1.0 / 2000.0;
-/// Maximum damage in a forecast. The damage of a failing body accelerates, and early errors grow with it.
+/// Maximum damage in a forecast. The damage of a failing body accelerates, and so do the errors of early steps.
 ///
 /// Tuned on the 13 adapted runs. Half: `square` takes 21 steps for 19. Twice: `square` takes 18 steps.
 const MAX_FORECAST: f64 = 0.1;

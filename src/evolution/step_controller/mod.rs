@@ -65,11 +65,11 @@ pub(super) struct StepState {
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: SourceLoad,
     load_change: DVector<f64>,
-    /// The error of ζ̃ from the steps so far, and the sum of the moduli of their doubts: by how much the estimated error of a step
-    /// may itself be wrong. Both grow with the damage and, for
-    /// two-step differences, they diffuse.
-    error: DVector<f64>,
-    doubt: DVector<f64>,
+    /// The lower and the upper bound on the error of ζ̃ from the steps so far, and the changes of the source by them, 1/s.
+    errors: [DVector<f64>; 2],
+    error_rates: [DVector<f64>; 2],
+    /// The time at which the lower bound reached ζ_*, if it did, s.
+    may_stop: Option<f64>,
     /// e_n of the last step, which ζ_n lacks.
     last_error: DVector<f64>,
     /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
@@ -83,17 +83,9 @@ pub(super) struct StepState {
 /// steps, the increments of the formula are off by ⅓ k³ζ‴, and the trapezoidal rule is off by 1/12 k³ζ‴. This error
 /// controls the lengths of the steps; a rule of third order estimates their accumulated error.
 const TRUNCATION: f64 = 4.0 / 3.0;
-/// The doubt about the error of a step is at least this times k_n times the change of the slope of the rate: in a
-/// smooth evolution half of the error.
-///
-/// Tuned on 81 bars of damage of the handbook. Half: two bars fail at 0.1. Twice: `damage_near_end` is not reached at
-/// 0.01, and `beam` takes 98 steps for 74.
-const DOUBT: f64 = 1.0 / 6.0;
-/// The doubt about the error of a step in which the rate jumps: at least this times k_n times the jump, by which the
-/// error may exceed its estimate.
-///
-/// Tuned on the 13 adapted runs. Half: nothing changes. Twice: 7 % more steps.
-const OF_JUMP: f64 = 0.5;
+/// The last term of the rule of third order over k_n (Δ_n − Δ_{n−1}), for equal steps. The error of the rule counts as at least
+/// this term.
+const LAST_TERM: f64 = 1.0 / 12.0;
 
 impl<'a> StepController<'a> {
     /// After (27), from ζ₀ = `zeta` and its damage source. Adaptive steps end at the times `followed`.
@@ -114,9 +106,10 @@ impl<'a> StepController<'a> {
             rate_change: zeros.clone(),
             source,
             load_change: zeros.clone(),
-            last_error: zeros.clone(),
-            doubt: zeros.clone(),
-            error: zeros,
+            errors: [zeros.clone(), zeros.clone()],
+            error_rates: [zeros.clone(), zeros.clone()],
+            may_stop: None,
+            last_error: zeros,
             bounds: problem.body.vertices.partition.min_max(zeta),
             violation: BoundViolation::default(),
             error_control: None,
@@ -190,9 +183,10 @@ impl<'a> StepController<'a> {
             let trapezoidal = planned.length * (&rate - 0.5 * &change);
             let truncation = TRUNCATION * (&trapezoidal - &increment);
             let added = &correction + truncation;
+            let of_steps = self.error();
             if let Some(error_control) = &mut self.error_control
                 && let Err(ratio) =
-                    error_control.accept(planned, &damage.zeta, &self.history.error, &added, &rate)
+                    error_control.accept(planned, &damage.zeta, &of_steps, &added, &rate)
             {
                 let shorter = self.retry(planned, ratio);
                 return shorter.ok_or_else(|| planned.failed(StepFailure::TooShort));
@@ -203,17 +197,21 @@ impl<'a> StepController<'a> {
             let turn = &change - &before;
             let error =
                 trapezoidal - increment - planned.length * omega / (6.0 * (1.0 + omega)) * &turn;
-            // 1 if Δ_n or Δ_{n−1} vanishes beside the other, as at a jump; small in a smooth evolution. The first step has no
-            // slope before.
-            let of_jump = if omega > 0.0 { OF_JUMP } else { 0.0 };
+            // A rate that jumps within the step is integrated with an error of up to ½ k_n times the jump. Then Δ_n or Δ_{n−1} vanishes
+            // beside the other; in a smooth evolution they are nearly equal. The first step has no Δ_{n−1}.
+            let of_jump = if omega > 0.0 { 0.5 } else { 0.0 };
             let jumps = of_jump * turn.abs().component_div(&(change.abs() + before.abs()));
-            let doubt = planned.length * jumps.map(|jumps| DOUBT.max(jumps)).component_mul(&turn);
-            self.add_error(planned.length, &error, &doubt, &corrected, &rate);
-            damage_step.diffuse(planned, &mut self.history.error)?;
-            damage_step.diffuse(planned, &mut self.history.doubt)?;
+            let doubt = jumps.map(|jumps| LAST_TERM.max(jumps)).component_mul(&turn.abs());
+            let doubt = planned.length * doubt;
+            let state = (&damage.zeta, &source, &correction);
+            let errors = [&error - &doubt, &error + &doubt];
+            self.add_error(planned, errors, state, damage_step)?;
             self.history.rate_change = change;
         } else {
-            self.add_euler_error(planned, &rate);
+            // The error is 0 or twice its estimate if the rate jumps near an end of the step.
+            let twice = self.twice_euler_error(planned, &source, &rate)?;
+            let errors = [twice.map(|of| of.min(0.0)), twice.map(|of| of.max(0.0))];
+            self.add_error(planned, errors, (&damage.zeta, &source, &correction), damage_step)?;
         }
         self.history.violation.observe(planned, damage.min_max, planned.time);
         let (lower, upper) = planned.bounds;
@@ -254,8 +252,6 @@ impl<'a> StepController<'a> {
             }
             last.state.time + fraction * planned.length
         } else {
-            // This step shows the error of the previous step.
-            self.add_euler_error(planned, &rate);
             planned.time
         };
         self.history.violation.observe(planned, damage.min_max, time);
@@ -270,9 +266,14 @@ impl<'a> StepController<'a> {
             Some(_) => (0.5 * ((rate - rate_before) / rate).abs()).min(1.0),
             None => 1.0,
         };
-        let uncertainty = of_step * planned.length + delay;
+        let uncertainty = match self.history.may_stop {
+            // The lower bound reached ζ_* in an earlier step, which tells more than an error that grows without limit.
+            Some(earliest) => planned.length + time - earliest,
+            None => of_step * planned.length + delay,
+        };
         let least_admissible = planned.bounds.0;
-        Decision::Stop(Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None })
+        let stop = Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None };
+        Decision::Stop(stop)
     }
 
     /// Decides about a step whose solves failed: with adaptive steps, a shorter one may succeed.
@@ -295,6 +296,11 @@ impl<'a> StepController<'a> {
             _ => None,
         };
         shorter.ok_or(failure)
+    }
+
+    /// The time at which ζ may have reached ζ_*, within its error from the time steps, s.
+    pub(crate) fn may_stop(&self) -> Option<f64> {
+        self.history.may_stop
     }
 
     pub(crate) fn violation(&self) -> BoundViolation {

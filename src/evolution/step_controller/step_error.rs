@@ -1,81 +1,123 @@
-//! The errors of ζ from the time steps, and their growth.
+//! The error of ζ from the time steps: the errors of all steps, transported to the present time.
+//!
+//! The error e of ζ̃ obeys e′ − κΔe = φ(û, ζ + e) − φ(u, ζ) between the steps, where ζ + e is exact and û belongs to it; each step
+//! adds its own error. Two fields with this equation bound e from below and above: they take the errors of the steps minus and
+//! plus the doubts about them. Their sources are integrated by the trapezoidal rule:
+//!
+//! e_n = D (e_{n−1} + ½ k (δφ_{n−1} + δφ_n) + error of the step),
+//!
+//! where D is the diffusion of one step, and δφ_n is taken at a predicted e_n.
+//!
+//! The strains of û are not solved for. In a bar under one force, of parts in series, they are known: ε̂ = r ε with
+//! r = ζ/(ζ + e), or if its ends are prescribed, ε̂ = r/⟨r⟩ ε with the mean ⟨r⟩ by the strain energy. In other bodies ∫ζ ε:𝒜 dε is
+//! the same for small e, and the body around a weak spot keeps it from straining that much. If prescribed displacements cause the
+//! share s of the strain energy, ε̂ = r ⟨r⟩^−s ε.
 
-use super::{DamageStep, PlannedStep, RunError, StepController};
-use crate::maximum;
+use super::{DamageStep, PlannedStep, RunError, SourceLoad, StepController};
 use nalgebra::DVector;
 
 impl StepController<'_> {
-    /// The estimated error E of the last accepted ζ from the time steps, at the nodes.
+    /// The estimated error of ζ̃: the mean of its bounds.
+    pub(super) fn error(&self) -> DVector<f64> {
+        0.5 * (&self.history.errors[0] + &self.history.errors[1])
+    }
+
+    /// The estimated error of the last accepted ζ from the time steps, at the nodes.
     pub(crate) fn step_error(&self) -> DVector<f64> {
-        &self.history.error + &self.history.last_error
+        self.error() + &self.history.last_error
     }
 
-    /// The error bar of ζ from the time steps, at the nodes: |E| + Σ|d| with the doubts d of the steps. The errors of loads
-    /// that rise and fall cancel in E, their doubts do not.
+    /// The error bar of ζ from the time steps, at the nodes.
     pub(crate) fn step_bar(&self) -> DVector<f64> {
-        self.step_error().abs() + &self.history.doubt
+        let bounds = self.history.errors.each_ref();
+        let [lower, upper] = bounds.map(|error| (error + &self.history.last_error).abs());
+        lower.sup(&upper)
     }
 
-    /// After the last step: adds the error of Euler's last step, which the rate of one more step shows. Collective.
+    /// Twice the error of the planned Euler step, at the nodes, by the trapezoidal rule:
+    ///
+    /// k (φ_n − φ_{n−1}) − kκΔ(ζ_n − ζ_{n−1}),   with κΔζ_n = ζ'_n − φ_{n−1} for the `rate` ζ'_n.
+    ///
+    /// (28) takes the source at the beginning of a step and the diffusion at its end. The first step counts no change of the
+    /// diffusion. Collective.
     ///
     /// # Errors
-    /// That step has no answer.
-    pub(crate) fn add_last_error(&mut self, damage_step: &mut DamageStep) -> Result<(), RunError> {
-        let length = self.history.length;
-        if self.two_step || length.is_infinite() {
-            return Ok(());
+    /// PETSc failed.
+    pub(super) fn twice_euler_error(
+        &self,
+        planned: &PlannedStep,
+        source: &SourceLoad,
+        rate: &DVector<f64>,
+    ) -> Result<DVector<f64>, RunError> {
+        let (vertices, history) = (&self.problem.body.vertices, &self.history);
+        let changes = &source.load - &history.source.load + &history.load_change;
+        let weights = DVector::from_column_slice(&vertices.weights);
+        let of_rate = rate - history.rate.as_ref().unwrap_or(rate);
+        let mut twice = planned.k * (changes.component_div(&weights) - of_rate);
+        vertices.partition.update(twice.as_mut_slice(), 1)?;
+        Ok(twice)
+    }
+
+    /// Transports the bounds on the error through a step to ζ_n = `zeta`, with its `source`, and adds the lowest and the highest of the
+    /// `errors` of the step. ζ̃_n is `zeta` plus the `correction`. Collective.
+    ///
+    /// # Errors
+    /// PETSc failed.
+    pub(super) fn add_error(
+        &mut self,
+        planned: &PlannedStep,
+        errors: [DVector<f64>; 2],
+        (zeta, source, correction): (&DVector<f64>, &SourceLoad, &DVector<f64>),
+        damage_step: &mut DamageStep,
+    ) -> Result<(), RunError> {
+        let threshold = self.problem.threshold();
+        for (i, error) in errors.into_iter().enumerate() {
+            let (earlier, rate) = (&self.history.errors[i], &self.history.error_rates[i]);
+            let predicted = earlier + planned.length * rate + &error;
+            let after = self.source_change(zeta, source, &(predicted + correction))?;
+            let mut error = earlier + 0.5 * planned.length * (rate + &after) + error;
+            damage_step.diffuse(planned, &mut error)?;
+            // A bound beyond ζ_* says no more.
+            let most = -(zeta + correction).add_scalar(-threshold);
+            let reaches = error.iter().zip(&most).any(|(error, most)| error <= most);
+            if self.problem.body.comm().any(reaches) {
+                self.history.may_stop.get_or_insert(planned.time);
+            }
+            (self.history.errors[i], self.history.error_rates[i]) = (error.sup(&most), after);
         }
-        let (start, load) = (self.history.zeta.clone(), self.history.source.load.clone());
-        let (n, time, bounds) = (0, 0.0, self.history.bounds);
-        let planned = PlannedStep { n, time, length, k: length, start, load, bounds };
-        let zeta = damage_step.solve(&planned)?.zeta;
-        self.add_euler_error(&planned, &planned.rate(&zeta));
         Ok(())
     }
 
-    /// Adds the error of the previous Euler step; `rate` is the rate of this step: (28) takes the source at the
-    /// beginning of a step, so the error is ½ k (ζ'_n − ζ'_{n−1}).
-    pub(super) fn add_euler_error(&mut self, planned: &PlannedStep, rate: &DVector<f64>) {
-        if let Some(before) = &self.history.rate {
-            let error = 0.5 * planned.k * (rate - before);
-            let (zeta, mean) = (self.history.zeta.clone(), 0.5 * (rate + before));
-            self.add_error(planned.length, &error, &error, &zeta, &mean);
-        }
-    }
-
-    /// Adds the `error` of a step of `length` s to `zeta` with the mean `rate`, and its `doubt`. Earlier errors grow by
-    /// the smaller one of two ratios:
-    ///
-    /// - exp(∫g), with g from [`error_growth`](crate::model::DamageSource::error_growth) of the damage source, by the trapezoidal
-    ///   rule, for strains proportional to 1/ζ. Prescribed displacements prevent such strains.
-    /// - ζ'_n / ζ'_{n−1}, at least 1. An error δζ of ζ' = φ(ζ) grows like ζ', and the rise of a load adds to this.
-    pub(super) fn add_error(
-        &mut self,
-        length: f64,
-        error: &DVector<f64>,
-        doubt: &DVector<f64>,
+    /// φ(û, ζ + e) − φ(u, ζ) at the nodes for e = `error`, 1/s, where `source` is that of u and ζ. Collective.
+    fn source_change(
+        &self,
         zeta: &DVector<f64>,
-        rate: &DVector<f64>,
-    ) {
-        if let (Some(laws), Some(before)) = (self.problem.damage(), &self.history.rate) {
-            // A node may belong to several materials.
-            let growth = |zeta: f64, rate: f64| {
-                let of_laws =
-                    laws.iter().map(|law| self.law.error_growth(law, zeta, rate.min(0.0)));
-                of_laws.fold(0.0, maximum)
-            };
-            for i in (0..zeta.len()).filter(|&i| before[i] < 0.0 || rate[i] < 0.0) {
-                let start = growth(self.history.zeta[i], before[i]);
-                let mut ratio = (0.5 * length * (start + growth(zeta[i], rate[i]))).exp();
-                if before[i] < 0.0 {
-                    ratio = -maximum(-ratio, -(rate[i] / before[i]).max(1.0));
-                }
-                self.history.error[i] *= ratio;
-                self.history.doubt[i] *= ratio;
-            }
+        source: &SourceLoad,
+        error: &DVector<f64>,
+    ) -> Result<DVector<f64>, RunError> {
+        let (problem, vertices) = (self.problem, &self.problem.body.vertices);
+        let mut change = DVector::zeros(zeta.len());
+        let Some(laws) = problem.damage() else { return Ok(change) };
+        let values = |i: usize| [zeta[i], zeta[i] + error[i]].map(|zeta| problem.truncated(zeta));
+        let ratio = |[zeta, exact]: [f64; 2]| zeta / exact;
+        let (share, energies) = &source.prescribed;
+        let mut sums = [0.0; 2];
+        for (i, energy) in energies.iter().enumerate() {
+            sums[0] += energy * ratio(values(i));
+            sums[1] += energy;
         }
-        self.history.error += error;
-        self.history.doubt += doubt.abs();
+        let comm = problem.body.comm();
+        let mean = if *share > 0.0 { comm.total(sums[0]) / comm.total(sums[1]) } else { 1.0 };
+        let around = mean.powf(-share);
+        for i in (0..vertices.partition.owned()).filter(|&i| source.load[i] < 0.0) {
+            let (phi, zeta) = (source.load[i] / vertices.weights[i], values(i));
+            let stretch = (around * ratio(zeta)).powi(2);
+            // A node may belong to several materials.
+            let changes = laws.iter().map(|law| self.law.source_change(law, phi, zeta, stretch));
+            change[i] = changes.max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        }
+        vertices.partition.update(change.as_mut_slice(), 1)?;
+        Ok(change)
     }
 
     /// At the node of minimum `zeta`: its error bar, and ζ′ in this step (`rate`) and in the one before, 1/s. Collective.

@@ -1,4 +1,4 @@
-//! Estimates the errors of an answer whose KKT residuals are small.
+//! The error of u from the solver, for an answer whose KKT residuals are small.
 
 use super::{ContactStep, active_bounds, displacement};
 use crate::{
