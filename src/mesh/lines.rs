@@ -55,13 +55,14 @@ impl<'a> Lines<'a> {
 
     /// Are some straight edges chords of curves? The tangents at their ends then have other directions.
     pub fn have_chords(&self) -> bool {
-        let turns = |a: usize, b: usize| {
-            let ([p, q], [x, y]) = ([a, b].map(|node| self.mesh.nodes[node]), self.tangent(a, b));
-            let [along_x, along_y] = [q[0] - p[0], q[1] - p[1]];
-            let cross = x * along_y - y * along_x;
-            cross.abs() > SAME_DIRECTION * x.hypot(y) * along_x.hypot(along_y)
-        };
-        self.ends.iter().any(|(a, others)| others.iter().any(|b| turns(*a, *b)))
+        let turns = |a: usize, b: &usize| self.angle(a, *b).abs() > SAME_DIRECTION;
+        self.ends.iter().any(|(a, others)| others.iter().any(|b| turns(*a, b)))
+    }
+
+    /// The angle, rad, from the chord of the edge ab to its tangent at a, counter-clockwise.
+    pub(super) fn angle(&self, a: usize, b: usize) -> f64 {
+        let [x, y] = self.tangent(a, b);
+        (Complex::new(x, y) * (self.point(b) - self.point(a)).conj()).arg()
     }
 
     /// Is the line from p over the node to q smooth there?
@@ -77,8 +78,8 @@ impl<'a> Lines<'a> {
         // Without the points of a geometry, a corner of the line next to p, or next to q, spoils the tangent on that side. The
         // line is then smooth at the node if the tangent of the other side is that of the circle through p, the node and q.
         let middle = self.circle(node, [p, q].map(|end| self.point(end)));
-        let follows = turn(a, -middle) - of_a <= 0.5 * self.largest_kink
-            || turn(b, middle) - of_b <= 0.5 * self.largest_kink;
+        let follows = of_b > 0.0 && turn(a, -middle) - of_a <= 0.5 * self.largest_kink
+            || of_a > 0.0 && turn(b, middle) - of_b <= 0.5 * self.largest_kink;
         turn(a, b) - of_a - of_b <= self.largest_kink || (!is_known && follows)
     }
 
@@ -94,11 +95,10 @@ impl<'a> Lines<'a> {
         let tangent = match *ends {
             _ if !ends.contains(&b) => self.chord(a, b),
             [p, q] if self.is_smooth(a, [p, q]) => {
-                let other = if p == b { q } else { p };
-                let [(own, of_own), (opposite, of_opposite)] =
-                    [b, other].map(|end| self.estimate(a, end));
+                let (own, of_own) = self.estimate(a, b);
+                let (opposite, of_opposite) = self.estimate(a, if p == b { q } else { p });
                 // Three nodes on a straight line show the tangent; the next nodes may lie behind a corner.
-                if self.are_straight(a, [p, q]) {
+                if turn(self.chord(a, p), self.chord(a, q)) <= SAME_DIRECTION {
                     self.chord(a, b)
                 } else if of_own + of_opposite > 0.0 {
                     own * of_opposite - opposite * of_own
@@ -161,11 +161,6 @@ impl<'a> Lines<'a> {
         let &[p, q] = self.ends.get(&b)?.as_slice() else { return None };
         let goes_on = !self.mesh.points.contains(&b) && self.turns_little(b, [p, q]);
         goes_on.then_some(if p == a { q } else { p })
-    }
-
-    /// Do both edges at the node lie on a straight line?
-    fn are_straight(&self, node: usize, [p, q]: [usize; 2]) -> bool {
-        turn(self.chord(node, p), self.chord(node, q)) <= SAME_DIRECTION
     }
 
     fn turns_little(&self, node: usize, [p, q]: [usize; 2]) -> bool {

@@ -62,7 +62,10 @@ fn refined_chords_follow_other_smooth_curves_in_fourth_order() {
         (curved_area(&mesh.on_smooth_curves().0) - 0.6 * 0.75 * PI).abs()
     });
     println!("{errors:?}");
-    assert!(errors[0] < 1e-2 && errors.windows(2).all(|pair| 7.0 * pair[1] < pair[0]), "{errors:?}");
+    assert!(
+        errors[0] < 1e-2 && errors.windows(2).all(|pair| 7.0 * pair[1] < pair[0]),
+        "{errors:?}"
+    );
 }
 
 #[test]
@@ -78,7 +81,11 @@ fn polygons_stay_as_they_are() {
         let ridge = 2.0 + 2.0 * (0.5 * degrees).to_radians().tan();
         vec![[2.0, -2.0], [2.0, 2.0], [0.0, ridge], [-2.0, 2.0], [-2.0, -2.0]]
     };
+    let end = 2.0 + 0.2 * 10_f64.to_radians().tan();
+    let left = end + 3.8 * 20_f64.to_radians().tan();
+    let uneven = vec![[2.0, -2.0], [2.0, 2.0], [1.8, end], [-2.0, left], [-2.0, -2.0]];
     let cases = [
+        ("a corner of 10° between short and long edges", uneven, 3),
         ("an octagon", regular(8), 1),
         ("an octagon", regular(8), 3),
         ("corners of 5°", regular(72), 2),
