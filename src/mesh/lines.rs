@@ -78,8 +78,8 @@ impl<'a> Lines<'a> {
         // Without the points of a geometry, a corner of the line next to p, or next to q, spoils the tangent on that side. The
         // line is then smooth at the node if the tangent of the other side is that of the circle through p, the node and q.
         let middle = self.circle(node, [p, q].map(|end| self.point(end)));
-        let follows = of_b > 0.0 && turn(a, -middle) - of_a <= 0.5 * self.largest_kink
-            || of_a > 0.0 && turn(b, middle) - of_b <= 0.5 * self.largest_kink;
+        let follows = turn(a, -middle) - of_a <= 0.5 * self.largest_kink
+            || turn(b, middle) - of_b <= 0.5 * self.largest_kink;
         turn(a, b) - of_a - of_b <= self.largest_kink || (!is_known && follows)
     }
 
@@ -97,10 +97,8 @@ impl<'a> Lines<'a> {
             [p, q] if self.is_smooth(a, [p, q]) => {
                 let (own, of_own) = self.estimate(a, b);
                 let (opposite, of_opposite) = self.estimate(a, if p == b { q } else { p });
-                // Three nodes on a straight line show the tangent; the next nodes may lie behind a corner.
-                if turn(self.chord(a, p), self.chord(a, q)) <= SAME_DIRECTION {
-                    self.chord(a, b)
-                } else if of_own + of_opposite > 0.0 {
+                // The estimate with the smaller error counts more: beside a corner, the other one is spoiled.
+                if of_own + of_opposite > 0.0 {
                     own * of_opposite - opposite * of_own
                 } else {
                     own - opposite
@@ -121,9 +119,7 @@ impl<'a> Lines<'a> {
         match self.points(a, b)[..] {
             [p, q, r] => {
                 let [tangent, farther] = [[p, q], [q, r]].map(|points| self.circle(a, points));
-                // Several edges on one straight line: r may lie behind the end of this line.
-                let is_straight = turn(tangent, -self.chord(a, b)) <= SAME_DIRECTION;
-                (tangent, if is_straight { 0.0 } else { turn(tangent, -farther) })
+                (tangent, turn(tangent, -farther))
             }
             [p, q] => {
                 let tangent = self.circle(a, [p, q]);
@@ -163,8 +159,18 @@ impl<'a> Lines<'a> {
         goes_on.then_some(if p == a { q } else { p })
     }
 
+    /// Does the line from p over the node to q turn there by so little that it may be smooth? Without points of the geometry,
+    /// two sides of several edges each, which are straight, meet in a corner.
     fn turns_little(&self, node: usize, [p, q]: [usize; 2]) -> bool {
-        turn(self.chord(node, p), self.chord(node, q)) <= self.largest_turn
+        let turns =
+            |node: usize, [p, q]: [usize; 2]| turn(self.chord(node, p), self.chord(node, q));
+        let goes_straight = |end: usize| match self.ends.get(&end).map(Vec::as_slice) {
+            Some(&[x, y]) => turns(end, [x, y]) <= SAME_DIRECTION,
+            _ => false,
+        };
+        let (angle, is_known) = (turns(node, [p, q]), !self.mesh.points.is_empty());
+        let is_small = is_known || angle <= self.largest_kink;
+        angle <= self.largest_turn && (is_small || !(goes_straight(p) && goes_straight(q)))
     }
 
     /// The unit direction in which the edge ab, as a straight line or an arc, leaves a.

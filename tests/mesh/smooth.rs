@@ -50,7 +50,7 @@ fn chords_of_circles_get_their_arcs_and_a_note_says_what_is_assumed() {
     // Where the points of the geometry are known, nothing is assumed.
     let corners = [0, 2, 12, 14].into();
     let (known, notes) = Mesh { points: corners, ..straight }.on_smooth_curves();
-    assert!(notes.is_empty() && known.curved == mesh.curved, "{notes:?}");
+    assert!(notes.is_empty() && known.curved.keys().eq(mesh.curved.keys()), "{notes:?}");
     assert!(mesh.on_smooth_curves().0 == mesh, "curved sides stay");
 }
 
