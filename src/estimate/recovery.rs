@@ -30,8 +30,6 @@ impl EnergyError {
 pub struct RecoveredStrains<'a> {
     body: &'a Body,
     u: &'a [f64],
-    /// The number of quadrature points in each triangle.
-    per_triangle: usize,
     /// Per material: the fits of the vertices.
     fits: Vec<Fits>,
 }
@@ -42,14 +40,13 @@ impl<'a> RecoveredStrains<'a> {
     /// # Errors
     /// PETSc failed.
     pub fn new(body: &'a Body, u: &'a [f64]) -> Result<Self, PetscError> {
-        let patches = body.patches();
-        let fits = patches.fits(&body.strains(u), Some(&body.vertices.partition))?;
-        Ok(Self { body, u, per_triangle: patches.per_triangle, fits })
+        let fits = body.patches().fits(&body.strains(u), Some(&body.vertices.partition))?;
+        Ok(Self { body, u, fits })
     }
 
     /// Estimates the error of u in the energy norm; `zeta` is ζ at the quadrature points. Collective.
     pub fn energy_error(&self, elasticity: &Elasticity, zeta: &[f64], u: &[f64]) -> EnergyError {
-        let Self { body, per_triangle, .. } = *self;
+        let (body, per_triangle) = (self.body, self.body.points_per_triangle());
         let square = |t: usize| {
             let own = per_triangle * t..per_triangle * (t + 1);
             let mean = zeta[own].iter().sum::<f64>() / per_triangle as f64;

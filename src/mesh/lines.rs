@@ -55,13 +55,14 @@ impl<'a> Lines<'a> {
 
     /// Are some straight edges chords of curves? The tangents at their ends then have other directions.
     pub fn have_chords(&self) -> bool {
-        let turns = |a: usize, b: usize| {
-            let ([p, q], [x, y]) = ([a, b].map(|node| self.mesh.nodes[node]), self.tangent(a, b));
-            let [along_x, along_y] = [q[0] - p[0], q[1] - p[1]];
-            let cross = x * along_y - y * along_x;
-            cross.abs() > SAME_DIRECTION * x.hypot(y) * along_x.hypot(along_y)
-        };
-        self.ends.iter().any(|(a, others)| others.iter().any(|b| turns(*a, *b)))
+        let turns = |a: usize, b: &usize| self.angle(a, *b).abs() > SAME_DIRECTION;
+        self.ends.iter().any(|(a, others)| others.iter().any(|b| turns(*a, b)))
+    }
+
+    /// The angle, rad, from the chord of the edge ab to its tangent at a, counter-clockwise.
+    pub(super) fn angle(&self, a: usize, b: usize) -> f64 {
+        let [x, y] = self.tangent(a, b);
+        (Complex::new(x, y) * (self.point(b) - self.point(a)).conj()).arg()
     }
 
     /// Is the line from p over the node to q smooth there?
@@ -94,13 +95,10 @@ impl<'a> Lines<'a> {
         let tangent = match *ends {
             _ if !ends.contains(&b) => self.chord(a, b),
             [p, q] if self.is_smooth(a, [p, q]) => {
-                let other = if p == b { q } else { p };
-                let [(own, of_own), (opposite, of_opposite)] =
-                    [b, other].map(|end| self.estimate(a, end));
-                // Three nodes on a straight line show the tangent; the next nodes may lie behind a corner.
-                if self.are_straight(a, [p, q]) {
-                    self.chord(a, b)
-                } else if of_own + of_opposite > 0.0 {
+                let (own, of_own) = self.estimate(a, b);
+                let (opposite, of_opposite) = self.estimate(a, if p == b { q } else { p });
+                // The estimate with the smaller error counts more: beside a corner, the other one is spoiled.
+                if of_own + of_opposite > 0.0 {
                     own * of_opposite - opposite * of_own
                 } else {
                     own - opposite
@@ -121,9 +119,7 @@ impl<'a> Lines<'a> {
         match self.points(a, b)[..] {
             [p, q, r] => {
                 let [tangent, farther] = [[p, q], [q, r]].map(|points| self.circle(a, points));
-                // Several edges on one straight line: r may lie behind the end of this line.
-                let is_straight = turn(tangent, -self.chord(a, b)) <= SAME_DIRECTION;
-                (tangent, if is_straight { 0.0 } else { turn(tangent, -farther) })
+                (tangent, turn(tangent, -farther))
             }
             [p, q] => {
                 let tangent = self.circle(a, [p, q]);
@@ -163,13 +159,18 @@ impl<'a> Lines<'a> {
         goes_on.then_some(if p == a { q } else { p })
     }
 
-    /// Do both edges at the node lie on a straight line?
-    fn are_straight(&self, node: usize, [p, q]: [usize; 2]) -> bool {
-        turn(self.chord(node, p), self.chord(node, q)) <= SAME_DIRECTION
-    }
-
+    /// Does the line from p over the node to q turn there by so little that it may be smooth? Without points of the geometry,
+    /// two sides of several edges each, which are straight, meet in a corner.
     fn turns_little(&self, node: usize, [p, q]: [usize; 2]) -> bool {
-        turn(self.chord(node, p), self.chord(node, q)) <= self.largest_turn
+        let turns =
+            |node: usize, [p, q]: [usize; 2]| turn(self.chord(node, p), self.chord(node, q));
+        let goes_straight = |end: usize| match self.ends.get(&end).map(Vec::as_slice) {
+            Some(&[x, y]) => turns(end, [x, y]) <= SAME_DIRECTION,
+            _ => false,
+        };
+        let (angle, is_known) = (turns(node, [p, q]), !self.mesh.points.is_empty());
+        let is_small = is_known || angle <= self.largest_kink;
+        angle <= self.largest_turn && (is_small || !(goes_straight(p) && goes_straight(q)))
     }
 
     /// The unit direction in which the edge ab, as a straight line or an arc, leaves a.

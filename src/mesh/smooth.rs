@@ -16,16 +16,14 @@ impl Mesh {
         }
         let lines = Lines::new(self, |triangle| &surfaces[triangle]);
         let sides = lines.ends.iter().flat_map(|(&a, ends)| ends.iter().map(move |&b| [a, b]));
-        let offset = |[a, b]: [usize; 2]| {
+        for [a, b] in sides.filter(|[a, b]| a < b) {
             let ([nx, ny], length) = self.edge_normal([a, b]);
-            let angle = |[x, y]: [f64; 2]| (-x * nx - y * ny).atan2(y * nx - x * ny);
-            let [at_a, at_b] = [angle(lines.tangent(a, b)), angle(lines.tangent(b, a).map(|x| -x))];
-            let sum = (0.5 * at_a).tan() - (0.5 * at_b).tan();
-            let is_chord = at_a.abs().max(at_b.abs()) > SAME_DIRECTION;
-            is_chord.then(|| [nx, ny].map(|n| -0.25 * length * sum * n))
-        };
-        for side in sides.filter(|[a, b]| a < b) {
-            offset(side).into_iter().for_each(|offset| mesh.set_offset(side, offset));
+            let angles = [lines.angle(a, b), -lines.angle(b, a)];
+            if angles.iter().any(|angle| angle.abs() > SAME_DIRECTION) {
+                let offset =
+                    -0.25 * length * angles.map(|angle| (0.5 * angle).tan()).iter().sum::<f64>();
+                mesh.set_offset([a, b], [offset * nx, offset * ny]);
+            }
         }
         let folds =
             |mesh: &Self, t: &[usize; 3]| mesh.is_curved(*t) && !mesh.jacobian_exceeds(0.0, *t);

@@ -113,7 +113,10 @@ fn bars_of_linear_elements_contain_the_error_of_the_polygon() {
             let found = outcome.last.figures[problem.figures.number(name).unwrap()].value;
             let (error, bar) = ((found - exact).abs(), bar(&bars, name));
             println!("{n}, {name}: off by {error:.2e}, bar {bar:.2e}");
-            assert!(error <= bar && bar < 4.0 * error, "{n}, {name}: off by {error:e}, bar {bar:e}");
+            assert!(
+                error <= bar && bar < 4.0 * error,
+                "{n}, {name}: off by {error:e}, bar {bar:e}"
+            );
             errors.push(error);
         }
     }

@@ -11,7 +11,8 @@ use signorini::{
 /// The measured errors of a scene on a square of n × n cells.
 fn measured(text: &str, n: usize) -> Measured {
     let (scene, session) = (scene(text), Session::start(&[]).unwrap());
-    accuracy::measured_errors(&session, &scene, [&square(n); 2], &RunOptions::of(&scene), None).unwrap()
+    accuracy::measured_errors(&session, &scene, [&square(n); 2], &RunOptions::of(&scene), None)
+        .unwrap()
 }
 
 /// A sheared square on a foundation.

@@ -116,7 +116,8 @@ fn with_bars(problem: &ObservedProblem) -> (Outcome, Vec<f64>) {
     let (mesh, scene) = (distorted(2), problem.scene());
     let session = Session::start(&[]).unwrap();
     let measured =
-        accuracy::measured_errors(&session, scene, [&mesh; 2], &RunOptions::of(scene), None).unwrap();
+        accuracy::measured_errors(&session, scene, [&mesh; 2], &RunOptions::of(scene), None)
+            .unwrap();
     drop(session);
     let (steps, mut outcome) = history(problem, SOLVERS[0]);
     outcome.set_bars(problem, &measured).expect("PETSc works");
