@@ -176,7 +176,9 @@ fn solve(
             values[i] /= norm;
         }
     }
-    let norms = matrix.column_iter().map(|column| column.norm()).collect::<Vec<_>>();
+    // A column of rounding belongs to a solution without loads.
+    let norms = matrix.column_iter().map(|column| column.norm());
+    let norms = Vec::from_iter(norms.map(|norm| if norm > ZERO { norm } else { 1.0 }));
     (0..5).for_each(|k| matrix.column_mut(k).unscale_mut(norms[k]));
     let svd = matrix.svd(true, true);
     let zero = ZERO * svd.singular_values.max();
