@@ -4,9 +4,12 @@ use super::{Measured, conclusion::KINKS_OF_TABLE};
 use crate::{
     advice::Singular,
     fem::ON_SIDE,
-    mesh::{distance, extent},
+    mesh::{TIES, distance, extent},
     model::von_mises,
-    observe::{ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Value, rows_of},
+    observe::{
+        ContactRow, Dimension, Figure, Known, NodalStress, ObservedProblem, Of, Rays, Value,
+        rows_of, sizes,
+    },
     petsc::PetscError,
     problem::State,
     scene::Boundary,
@@ -24,6 +27,8 @@ pub struct Extreme {
     pub at: [f64; 2],
     /// If the stress is singular there, and so grows as the mesh is refined: the reason.
     pub singular: Option<String>,
+    /// If it is the extreme over the directions at a corner: what stresses elsewhere exceed it by, Pa; else 0.
+    pub(super) excess: f64,
     /// If the mesh does not resolve it, as at a peak of the contact pressure: the reason.
     pub unresolved: Option<String>,
 }
@@ -71,32 +76,64 @@ impl<'a> Extremes<'a> {
         let extreme = |(number, _): (usize, _)| {
             let part = problem.part_of(number, values);
             let (name, at) = (problem.figures[number].name.clone(), values[part].at?);
-            Some(Extreme { number, name, at, singular: None, unresolved: None })
+            Some(Extreme { number, name, at, singular: None, excess: 0.0, unresolved: None })
         };
         let all = figures.filter_map(extreme).collect();
         let (_, ends) = problem.supports.contact.length(&rows);
         let unresolved = problem.unresolved_peaks(&rows);
-        let directions = problem.rays(state).iter().map(|rays| rays.at).collect();
+        let rays = problem.rays(state);
+        let directions = rays.iter().map(|rays| rays.at).collect();
         let mut extremes = Self { problem, all, stresses, rows, ends, directions };
-        let near = extremes.near(&unresolved, 1.001);
+        let near = extremes.near(&unresolved);
         extremes.all.iter_mut().zip(near).for_each(|(of, name)| of.unresolved = name);
-        extremes.find_jumps();
+        extremes.find_jumps(&rays);
+        let corners = Known::all(problem, &rays, |i| sizes(extremes.stresses[i]));
+        for i in 0..extremes.all.len() {
+            extremes.all[i].excess = extremes.excess(&extremes.all[i], values, &corners);
+        }
         Ok(extremes)
     }
 
-    /// Marks the extreme stresses in triangles near a jump of a load as not resolved: fitted strains overshoot there by the same
-    /// part on all meshes. Collective.
-    fn find_jumps(&mut self) {
-        let (body, nodal) = (&self.problem.body, self.problem.nodal_stress());
-        let near = &body.near_jumps;
-        if near.is_empty() {
-            return;
+    /// See [`Extreme::excess`]. Collective.
+    fn excess(&self, of: &Extreme, values: &[Value], corners: &[Known]) -> f64 {
+        let figure = &self.problem.figures[of.number];
+        let kinds = ["von_mises_max", "principal_max", "principal_min"];
+        let Some(k) = kinds.iter().position(|kind| *kind == figure.kind) else { return 0.0 };
+        if corners.iter().all(|corner| corner.at != of.at) {
+            return 0.0;
         }
+        let points = self.problem.nodal_stress().points.iter().enumerate();
+        let points = points.filter(|(i, point)| {
+            self.is_in(figure, point.material) && !corners.iter().any(|of| of.is_near(*i, point))
+        });
+        let largest = points.map(|(i, _)| sizes(self.stresses[i])[k]).fold(0.0, f64::max);
+        let excess = largest - figure.size(values[of.number].value);
+        self.problem.body.comm().max(excess.max(0.0))
+    }
+
+    /// Does a figure of stresses describe this material?
+    fn is_in(&self, figure: &Figure, material: usize) -> bool {
+        match &figure.of {
+            Of::Material(name) => self.problem.materials.contains(&(material, name.clone())),
+            _ => true,
+        }
+    }
+
+    /// Marks the extreme stresses in triangles near a jump of a load, or at a corner where other loads determine a part of them, as
+    /// not resolved: fitted strains overshoot there by the same part on all meshes. Collective.
+    fn find_jumps(&mut self, rays: &[Rays]) {
+        let (body, nodal) = (&self.problem.body, self.problem.nodal_stress());
+        let jumps = &body.near_jumps;
         let triangles = body.mesh.triangles.iter();
-        let next = triangles.filter(|triangle| triangle.iter().any(|&vertex| near[vertex]));
+        let next =
+            triangles.filter(|triangle| triangle.iter().any(|&v| jumps.get(v) == Some(&true)));
         let next: HashSet<usize> = next.flatten().copied().collect();
-        let points = nodal.points.iter().filter(|of| of.ends.iter().any(|end| next.contains(end)));
-        let places = Vec::from_iter(points.map(|point| point.at));
+        let unknown = rays.iter().filter(|of| of.stresses.is_none());
+        let unknown = Vec::from_iter(unknown.map(|of| of.near(self.problem)));
+        let points = nodal.points.iter().enumerate().filter(|(i, of)| {
+            of.ends.iter().any(|end| next.contains(end)) || unknown.iter().any(|near| near[*i])
+        });
+        let places = Vec::from_iter(points.map(|(_, point)| point.at));
         for of in &mut self.all {
             let is_there = body.comm().any(places.contains(&of.at));
             if is_there && !self.problem.figures[of.number].is_pressure() {
@@ -125,7 +162,9 @@ impl<'a> Extremes<'a> {
                 true if extreme.is_known() => {
                     extreme.unresolved = Some("it does not converge over the meshes".to_owned())
                 }
-                false if !measured.bars.is_empty() => extreme.singular = None,
+                false if !measured.bars.is_empty() => {
+                    (extreme.singular, extreme.unresolved) = (None, None);
+                }
                 _ => {}
             }
             let shows_table = |of: &Boundary| {
@@ -163,6 +202,7 @@ impl<'a> Extremes<'a> {
                     name: figure.name.clone(),
                     at,
                     singular: singular.map(|point| point.name.clone()),
+                    excess: 0.0,
                     unresolved: singular.is_none().then_some(reason),
                 },
             )
@@ -186,6 +226,7 @@ impl<'a> Extremes<'a> {
                 name: figure.name.clone(),
                 at: [f64::NAN; 2],
                 singular: None,
+                excess: 0.0,
                 unresolved: Some(reason),
             })
         };
@@ -196,10 +237,8 @@ impl<'a> Extremes<'a> {
 
     /// The extremes with the names of the singular `points` near which they are. Collective.
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
-        /// On six bodies half of it changed nothing; twice of it changed meshes.
-        const EDGES: f64 = 3.001;
         let points = points.iter().filter(|of| !of.is_open || !self.presses(of.at)).cloned();
-        let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points), EDGES));
+        let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points)));
         extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
     }
 
@@ -207,20 +246,19 @@ impl<'a> Extremes<'a> {
         self.rows.iter().any(|row| (row.x, row.y) == (x, y) && row.pressure > 0.0)
     }
 
-    /// Per extreme: the name of the nearest of the `points` of the boundary within some `edges`. A stress that is large
-    /// because of a point is large at the point itself, if it is known there. Collective.
-    fn near(&self, points: &[Singular], edges: f64) -> Vec<Option<String>> {
+    /// Per extreme: the name of the nearest of the `points` that have it in a triangle. The means of fitted strains reach one
+    /// triangle farther. A value that is large because of a point is large at the point itself: a pressure, on its boundary. Collective.
+    fn near(&self, points: &[Singular]) -> Vec<Option<String>> {
         let named = |extreme: &Extreme| {
+            let of_fits = !self.problem.figures[extreme.number].is_pressure();
+            let reach = if of_fits { 2.0 / TIES } else { 1.0 / TIES };
             let near =
-                points.iter().filter(|point| extreme.distance(point.at) <= edges * point.radius);
+                points.iter().filter(|point| extreme.distance(point.at) <= reach * point.radius);
             let nearest =
                 near.min_by(|a, b| extreme.distance(a.at).total_cmp(&extreme.distance(b.at)));
             let value = |at: [f64; 2]| self.value(extreme, at);
-            let there = |point: &&Singular| {
-                let there = value(point.at);
-                there >= 0.5 * value(extreme.at) || !there.is_finite()
-            };
-            nearest.filter(there).map(|point| point.name.clone())
+            let is_large = |point: &&Singular| value(point.at) >= 0.5 * value(extreme.at);
+            nearest.filter(is_large).map(|point| point.name.clone())
         };
         self.all.iter().map(named).collect()
     }
@@ -237,14 +275,8 @@ impl<'a> Extremes<'a> {
             });
             return there.map(|row| row.pressure).fold(f64::NEG_INFINITY, f64::max);
         }
-        let material = match &figure.of {
-            Of::Material(name) => problem.materials.iter().find(|(_, of)| of == name),
-            _ => None,
-        };
         let there = self.stresses.iter().zip(&problem.nodal_stress().points);
-        let there = there.filter(|(_, point)| {
-            point.at == at && material.is_none_or(|(number, _)| *number == point.material)
-        });
+        let there = there.filter(|(_, point)| point.at == at && self.is_in(figure, point.material));
         let own = there.map(|(stress, _)| von_mises(*stress)).fold(f64::NEG_INFINITY, f64::max);
         problem.body.comm().max(own)
     }

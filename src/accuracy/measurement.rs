@@ -236,7 +236,11 @@ impl Measurement {
         let problem = coarse.problem;
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
-            dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
+            dimension => {
+                let excess = coarse.extremes.all.iter().find(|of| of.number == i);
+                sequence.error(i, matches!(dimension, Dimension::Stress))
+                    + excess.map_or(0.0, |of| of.excess)
+            }
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
         let Measured { bars, not_converged, .. } = &mut self.result;

@@ -1,7 +1,7 @@
 //! Advice to the user: notes on a problem, singular points, and data that the mesh does not resolve.
 //!
 //! - [`DiscreteProblem::notes`](crate::problem::DiscreteProblem::notes): the notes before any solve;
-//! - [`Singular`]: points at which stresses grow with every finer mesh; peaks of the pressure that the mesh does not resolve;
+//! - [`Singular`]: peaks of the pressure that the mesh does not resolve, as points at which it grows with every finer mesh;
 //! - `unresolved`: edges that must be halved to resolve prescribed displacements and the initial damage;
 //! - `Penetration`: where the body penetrates a foundation between the nodes.
 //!

@@ -1,8 +1,9 @@
 //! The corners at which stresses depend on the direction.
 //!
 //! In the triangles around such a corner u_h is as wrong on a fine mesh as on a coarse one: stresses overshoot at its own scale. Theory
-//! knows their extreme F over all directions. Fits from these triangles do not count. With C = max (f − F) r/h over their
-//! points, where r is the distance from the corner and h the longest edge at a point, a stress f elsewhere counts only beyond F + C h/r.
+//! knows the stress f(θ) in each direction, and its extreme F. Fits from these triangles do not count. Their errors fall at
+//! least like h/r with the distance r from the corner and the longest edge h at a point. With C = max |f_h − f(θ)| r/h over the
+//! points in these triangles, a stress elsewhere counts only beyond F + C h/r.
 
 use super::{NodalStress, ObservedProblem, nodal_stress::Point, principal};
 use crate::{
@@ -31,8 +32,8 @@ pub struct Rays<'a> {
 }
 
 /// The extremes over the directions at a corner.
-pub(super) struct Known<'a> {
-    pub(super) at: [f64; 2],
+pub(crate) struct Known<'a> {
+    pub(crate) at: [f64; 2],
     /// Per material: F of the von Mises stress, σ₁ and −σ₂, Pa; −∞ if it is not at the corner.
     pub(super) extremes: Vec<[f64; 3]>,
     /// Per material: C of the same, Pa.
@@ -41,7 +42,7 @@ pub(super) struct Known<'a> {
 }
 
 /// The von Mises stress, σ₁ and −σ₂ of (σ_xx, σ_yy, σ_xy, σ_zz), Pa.
-pub(super) fn sizes(stress: [f64; 4]) -> [f64; 3] {
+pub(crate) fn sizes(stress: [f64; 4]) -> [f64; 3] {
     let [most, least] = principal(stress);
     [von_mises(stress), most, -least]
 }
@@ -69,27 +70,30 @@ impl ObservedProblem {
 }
 
 impl Known<'_> {
-    /// The corners with known extremes, where `sizes_at` gives the [`sizes`] of the fits at a point. Collective.
-    pub(super) fn all<'a>(
+    /// The corners with known extremes, where `sizes_at` gives the [`sizes`] of the fits at the point with a number. Collective.
+    pub(crate) fn all<'a>(
         problem: &ObservedProblem,
         rays: &'a [Rays],
-        sizes_at: impl Fn(&Point) -> [f64; 3],
+        sizes_at: impl Fn(usize) -> [f64; 3],
     ) -> Vec<Known<'a>> {
         let nodal = problem.nodal_stress();
         let known = |rays: &'a Rays| {
             let mut extremes = vec![[f64::NEG_INFINITY; 3]; nodal.materials.len()];
+            let mut by_direction = Vec::new();
             for &(material, [xx, yy, xy]) in rays.stresses.as_ref()? {
                 let zz = nodal.materials[material].0.out_of_plane(&Vector3::new(xx, yy, xy));
                 let of = sizes([xx, yy, xy, zz]);
                 (0..3).for_each(|k| extremes[material][k] = of[k].max(extremes[material][k]));
+                by_direction.push(of);
             }
             let mut excess = vec![[0.0; 3]; extremes.len()];
             let near = rays.near(problem);
-            for point in nodal.points.iter().zip(near).filter(|(_, near)| **near).map(|of| of.0) {
-                let (own, size) = (sizes_at(point), nodal.relative_size(point, rays.at));
+            for (i, point) in nodal.points.iter().enumerate().filter(|(i, _)| near[*i]) {
+                let (own, exact) = (sizes_at(i), by_direction[rays.of.corner.direction(point.at)]);
+                let size = nodal.relative_size(point, rays.at);
                 for k in 0..3 {
-                    let over: f64 = (own[k] - extremes[point.material][k]) / size;
-                    excess[point.material][k] = over.max(excess[point.material][k]);
+                    let error = (own[k] - exact[k]).abs() / size;
+                    excess[point.material][k] = error.max(excess[point.material][k]);
                 }
             }
             let comm = problem.body.comm();
@@ -100,7 +104,7 @@ impl Known<'_> {
     }
 
     /// Is the point of this rank with the number `i` next to the corner, in a material of the corner?
-    pub(super) fn is_near(&self, i: usize, point: &Point) -> bool {
+    pub(crate) fn is_near(&self, i: usize, point: &Point) -> bool {
         self.near[i] && self.extremes[point.material][0] > f64::NEG_INFINITY
     }
 
@@ -120,7 +124,7 @@ impl Known<'_> {
 
 impl Rays<'_> {
     /// Per point of this rank: is it next to the corner?
-    fn near(&self, problem: &ObservedProblem) -> &[bool] {
+    pub(crate) fn near(&self, problem: &ObservedProblem) -> &[bool] {
         self.of.near.get_or_init(|| {
             let (mesh, nodal) = (problem.mesh(), problem.nodal_stress());
             let mut vertices = HashSet::from_iter([self.of.corner.node]);

@@ -169,13 +169,13 @@ impl ObservedProblem {
         let (nodal, body) = (self.nodal_stress(), &self.body);
         let fits = nodal.patches.fits(&of.strains, Some(&body.vertices.partition))?;
         let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; nodal.materials.len()];
-        let sizes_at = |point: &Point| sizes(nodal.stress(point, of, &fits));
+        let sizes_at = |i: usize| sizes(nodal.stress(&nodal.points[i], of, &fits));
         let corners = Known::all(self, rays, sizes_at);
         for (i, point) in nodal.points.iter().enumerate() {
             if corners.iter().any(|corner| corner.is_near(i, point)) {
                 continue;
             }
-            let values = sizes_at(point);
+            let values = sizes_at(i);
             for (k, largest) in largest[point.material].iter_mut().enumerate() {
                 let counts = |of: &Known| of.is_exceeded(nodal, point, k, values[k]);
                 if values[k] >= largest.0 && corners.iter().all(counts) {

@@ -20,6 +20,10 @@ use crate::scene::{Condition, Expression, Scene};
 use nalgebra::{
     Matrix2x4, Matrix4x5, Matrix5, RowVector5, SMatrix, SVector, Vector2, Vector4, Vector5,
 };
+use std::f64::consts::{PI, TAU};
+
+/// Parts of each sector between directions. An extreme between two of them is larger by (π/256)²/8 of its second derivative, 2e-5.
+const RAYS: usize = 256;
 
 /// A corner of the boundary at which stresses are not singular for their exponents λ.
 #[derive(Debug, Clone)]
@@ -100,10 +104,25 @@ impl Corner {
         }
     }
 
+    /// The number of the direction of a point among the [`RAYS`] of each sector.
+    pub(crate) fn direction(&self, [x, y]: [f64; 2]) -> usize {
+        let all: f64 = self.sectors.iter().map(|sector| sector.angle).sum();
+        let angle = (y - self.at[1]).atan2(x - self.at[0]) - self.sides[0].angle;
+        // A point of the first side may lie at an angle of −ε.
+        let mut left = (angle - 0.5 * all + PI).rem_euclid(TAU) - PI + 0.5 * all;
+        let mut first = 0;
+        for sector in &self.sectors[..self.sectors.len() - 1] {
+            if left < sector.angle {
+                break;
+            }
+            (left, first) = (left - sector.angle, first + RAYS + 1);
+        }
+        let angle = self.sectors[first / (RAYS + 1)].angle;
+        first + (RAYS as f64 * (left / angle).clamp(0.0, 1.0)).round() as usize
+    }
+
     /// The stresses in many directions, from z and ω on the first side.
     fn rays(&self, start: Vector5<f64>, unit: f64) -> Vec<(usize, [f64; 3])> {
-        /// Per sector. An extreme between two directions is larger by (π/256)²/8 of its second derivative, 2e-5.
-        const RAYS: usize = 256;
         let (mut z, mut angle, mut rays) = (start, self.sides[0].angle, Vec::new());
         for sector in &self.sectors {
             let step = (sector.system_of_degree_0(unit) * (sector.angle / RAYS as f64)).exp();
@@ -157,7 +176,9 @@ fn solve(
             values[i] /= norm;
         }
     }
-    let norms = matrix.column_iter().map(|column| column.norm()).collect::<Vec<_>>();
+    // A column of rounding belongs to a solution without loads.
+    let norms = matrix.column_iter().map(|column| column.norm());
+    let norms = Vec::from_iter(norms.map(|norm| if norm > ZERO { norm } else { 1.0 }));
     (0..5).for_each(|k| matrix.column_mut(k).unscale_mut(norms[k]));
     let svd = matrix.svd(true, true);
     let zero = ZERO * svd.singular_values.max();
@@ -169,34 +190,32 @@ fn solve(
 
 impl Side {
     /// The values of the side at time t, as far as conditions prescribe them: of loads (0, 0, σ_rθ, σ_θθ), Pa, and of displacements
-    /// (ε_rr, u_θ/r, 0, 0) without their value at the corner. They are limits at the corner.
+    /// (ε_rr, u_θ/r, 0, 0) without their value at the corner. They are limits at the corner, by two points near it.
     fn values(&self, corner: [f64; 2], scene: &Scene, t: f64, is_last: bool) -> Vector4<f64> {
-        /// The distance of the point that stands for the limit, over the length of the edge.
+        /// The distance of the nearer point, over the length of the edge.
         const NEAR: f64 = 1e-5;
-        let point = [0, 1].map(|k| corner[k] + NEAR * (self.end[k] - corner[k]));
-        let distance = (point[0] - corner[0]).hypot(point[1] - corner[1]);
-        let conditions =
-            self.boundaries.iter().flat_map(|&number| &scene.boundaries[number].conditions);
-        let mut values = Vector4::zeros();
-        for condition in conditions {
-            match condition {
+        let edge = [0, 1].map(|k| self.end[k] - corner[k]);
+        let at = |part: f64| {
+            let [x, y] = [0, 1].map(|k| corner[k] + part * edge[k]);
+            let length = part * edge[0].hypot(edge[1]);
+            let slope = |u: &Option<Expression>| {
+                let change = |u: &Expression| u.eval(x, y, t) - u.eval(corner[0], corner[1], t);
+                u.as_ref().map_or(0.0, |u| change(u) / length)
+            };
+            let value = |condition: &Condition| match condition {
                 Condition::Load(load) => {
-                    values += self.of_traction(load.at(point, self.normal(is_last), t), is_last);
+                    self.of_traction(load.at([x, y], self.normal(is_last), t), is_last)
                 }
                 Condition::Displacement(u) => {
-                    let slope = |u: &Option<Expression>| {
-                        u.as_ref().map_or(0.0, |u| {
-                            (u.eval(point[0], point[1], t) - u.eval(corner[0], corner[1], t))
-                                / distance
-                        })
-                    };
                     let [r, theta] = self.polar(u.each_ref().map(slope));
-                    values += Vector4::new(r, theta, 0.0, 0.0);
+                    Vector4::new(r, theta, 0.0, 0.0)
                 }
-                Condition::Symmetry | Condition::Gap(_) => {}
-            }
-        }
-        values
+                Condition::Symmetry | Condition::Gap(_) => Vector4::zeros(),
+            };
+            let boundaries = self.boundaries.iter().map(|&number| &scene.boundaries[number]);
+            boundaries.flat_map(|of| &of.conditions).map(value).sum::<Vector4<f64>>()
+        };
+        2.0 * at(NEAR) - at(2.0 * NEAR)
     }
 
     /// (0, 0, σ_rθ, σ_θθ), Pa, of a traction on the side, Pa.

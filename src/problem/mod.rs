@@ -5,6 +5,7 @@
 //! - [`DiscreteProblem`]: the body, its materials, its supports and the tolerance;
 //! - [`Loads`]: nodal loads, prescribed displacements and gaps as functions of time, integrated so finely that no
 //!   narrow load is overlooked (`LoadCase`: their values at one time);
+//! - [`Singular`]: the points with singular stresses; `Corner`: those at which stresses depend on the direction;
 //! - [`State`]: time, displacements, damage and contact at one time.
 //!
 //! What crosses the door: `evolution` advances a [`DiscreteProblem`] from [`State`] to [`State`]. The rooms

@@ -14,7 +14,7 @@ use super::{
     loads::{jump, load_jumps},
 };
 use crate::{
-    mesh::Lines,
+    mesh::{Lines, distance, longest_side},
     scene::{Boundary, Condition},
 };
 use nalgebra::{Complex, Matrix2x4, Matrix3, Matrix4, Matrix5, Vector4};
@@ -27,7 +27,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 pub struct Singular {
     /// The point, m.
     pub at: [f64; 2],
-    /// The distance within which the point makes stresses large, m: the length of the longest edge at the point.
+    /// The distance within which the point makes stresses large, m: the length of the longest side of its triangles.
     pub radius: f64,
     /// The kind of the point, as in "the end of `clamp`".
     pub name: String,
@@ -129,6 +129,8 @@ struct Wedges<'a> {
     lines: Lines<'a>,
     /// By the side ab of a triangle abc with a on a line: the node c and the material.
     next: HashMap<[usize; 2], (usize, usize)>,
+    /// Per node on a line: the length of the longest side of its triangles, m.
+    longest: HashMap<usize, f64>,
     /// Per material: its stiffness, Pa.
     stiffness: Vec<Matrix3<f64>>,
 }
@@ -210,15 +212,9 @@ impl DiscreteProblem {
         let [nx, ny] = corner.sides[0].normal(false);
         let load = corner.sides[0].of_traction([x - pressure * nx, y - pressure * ny], false);
         let grows = matches!(corner.effect_of([load, Vector4::zeros()], false), Effect::Singular);
-        let (at, radius) = (corner.at, self.radius(wedges, node));
+        let (at, radius) = (corner.at, wedges.longest[&node]);
         let name = "a jump of a shear load".to_owned();
         Some(if grows { Ok(Singular { at, radius, name, is_open: false }) } else { Err(corner) })
-    }
-
-    /// The length of the longest edge of a line at the node, m.
-    fn radius(&self, wedges: &Wedges, node: usize) -> f64 {
-        let lengths = wedges.lines.ends[&node].iter();
-        lengths.map(|&end| self.mesh().edge_normal([node, end]).1).fold(0.0, f64::max)
     }
 
     /// The corner with these sectors and, per side, the end of its edge and the rows of its conditions.
@@ -246,7 +242,7 @@ impl DiscreteProblem {
 
     /// The lines of the mesh with its wedges.
     fn wedges(&self) -> Wedges<'_> {
-        let (mesh, mut next) = (self.mesh(), HashMap::default());
+        let (mesh, mut next, mut longest) = (self.mesh(), HashMap::default(), HashMap::default());
         let stiffness: Vec<_> = self.scene().materials().map(|of| of.stiffness()).collect();
         let numbers = self.scene().materials_of(mesh);
         let material = |t: usize| numbers.get(t).map_or(0, |&number| number as usize);
@@ -254,9 +250,15 @@ impl DiscreteProblem {
         for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
             let sides = [[a, b, c], [b, c, a], [c, a, b]].into_iter();
             let sides = sides.filter(|side| lines.ends.contains_key(&side[0]));
-            next.extend(sides.map(|[p, q, r]| ([p, q], (r, material(t)))));
+            for [p, q, r] in sides {
+                next.insert([p, q], (r, material(t)));
+                let ([from, to], _) = longest_side(&mesh.nodes, [a, b, c]);
+                let length = distance(mesh.nodes[from], mesh.nodes[to]);
+                let known = longest.entry(p).or_insert(length);
+                *known = length.max(*known);
+            }
         }
-        Wedges { lines, next, stiffness }
+        Wedges { lines, next, longest, stiffness }
     }
 
     /// The singular point, or else the corner, of the sectors at a node counter-clockwise from the edge to `first`. `None` inside the
@@ -303,7 +305,7 @@ impl DiscreteProblem {
             cases.find(|&[i, k]| is_singular(&within, (!is_inside).then_some([of_a[i], of_b[k]])));
         let is_open = case == Some([of_a.len() - 1, of_b.len() - 1]) && case != Some([0, 0]);
         let of = sides[usize::from(b > a)].map_or("", |(_, boundary)| &*boundary.name);
-        let (at, radius) = (self.mesh().nodes[node], self.radius(wedges, node));
+        let (at, radius) = (self.mesh().nodes[node], wedges.longest[&node]);
         if case.is_none() {
             if is_inside {
                 return None;

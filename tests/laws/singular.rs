@@ -232,7 +232,9 @@ fn a_jump_of_a_shear_load_is_singular_and_a_jump_of_a_pressure_is_not() {
              boundary = [{{ name = 'top', {load} }}, {{ name = 'bottom', symmetry = true }}, {{ name = 'left', symmetry = true }}]"
         );
         let problem = problem(square(10), &text);
-        let points = problem.unwrap_or_else(|e| panic!("{e}")).singular_points();
+        let mut points = problem.unwrap_or_else(|e| panic!("{e}")).singular_points();
+        // The mirror image of a shear load at the axis of symmetry jumps as well.
+        points.retain(|point| point.at[0] > 0.0);
         assert_eq!(points.len(), usize::from(place.is_some()), "{load}: {points:?}");
         let is_there =
             |x: f64| (points[0].at[0] - x).abs() < 1e-9 && points[0].name.contains("jump");
