@@ -5,7 +5,7 @@ use crate::{
     estimate::{RecoveredStrains, UNLOADED, at_vertices},
     evolution::{Outcome, RunError, RunOptions, Step, all_steps},
     mesh::Mesh,
-    observe::ObservedProblem,
+    observe::{ContactRow, ObservedProblem},
     petsc::{PetscError, Session},
     problem::State,
 };
@@ -165,6 +165,8 @@ pub(super) struct Answer {
     pub(super) values: Vec<f64>,
     /// The length of the part of Γ_C on which the ends of contact may lie, m.
     pub(super) open: f64,
+    /// The rows of Γ_C at the end.
+    pub(super) rows: Vec<ContactRow>,
     /// The time of ζ_*, s.
     pub(super) stop: Option<f64>,
 }
@@ -184,6 +186,7 @@ impl Answer {
             error,
             values: run.outcome.last.figures.iter().map(|of| of.value).collect(),
             open: run.open_length(),
+            rows: run.extremes.rows.clone(),
             stop: run.stop(),
         }
     }

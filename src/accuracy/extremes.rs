@@ -1,13 +1,12 @@
 //! Why the mesh does not determine an extreme stress or pressure of a state, and where contact ends.
 
-use super::{Measured, conclusion::KINKS_OF_TABLE};
+use super::Measured;
 use crate::{
-    advice::Singular,
+    advice::{Kink, SEEN, Singular},
     model::von_mises,
     observe::{ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Value, rows_of},
     petsc::PetscError,
     problem::State,
-    scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
 
@@ -24,6 +23,8 @@ pub struct Extreme {
     pub singular: Option<String>,
     /// If the mesh does not resolve it, as at a peak of the contact pressure: the reason.
     pub unresolved: Option<String>,
+    /// What kinks of the gap add to a pressure on finer meshes, Pa; infinite if no bar can bear it.
+    pub(super) growth: f64,
 }
 
 impl Extreme {
@@ -44,7 +45,7 @@ pub struct Extremes<'a> {
     pub all: Vec<Extreme>,
     /// The stresses at the points of this rank, Pa, and the rows of Γ_C.
     stresses: Vec<[f64; 4]>,
-    rows: Vec<ContactRow>,
+    pub(super) rows: Vec<ContactRow>,
     /// Each end of contact lies between an active node and the next one: their places, m.
     pub(super) ends: Vec<[[f64; 2]; 2]>,
 }
@@ -67,7 +68,7 @@ impl<'a> Extremes<'a> {
         let extreme = |(number, _): (usize, _)| {
             let part = problem.part_of(number, values);
             let (name, at) = (problem.figures[number].name.clone(), values[part].at?);
-            Some(Extreme { number, name, at, singular: None, unresolved: None })
+            Some(Extreme { number, name, at, singular: None, unresolved: None, growth: 0.0 })
         };
         let all = figures.filter_map(extreme).collect();
         let (_, ends) = problem.supports.contact.length(&rows);
@@ -76,7 +77,33 @@ impl<'a> Extremes<'a> {
         let near = extremes.near(&unresolved, 1.001);
         extremes.all.iter_mut().zip(near).for_each(|(of, name)| of.unresolved = name);
         extremes.find_jumps();
+        extremes.add_kinks(&problem.kinks(state, &extremes.rows), values);
         Ok(extremes)
+    }
+
+    /// Makes the largest pressures infinite that finer meshes exceed at a kink of the gap by a part that is seen, or by half of the accuracy. The bar
+    /// of others bears the part.
+    fn add_kinks(&mut self, kinks: &[Kink], values: &[Value]) {
+        let accuracy = self.problem.scene().accuracy.unwrap_or(1.0);
+        for extreme in &mut self.all {
+            let (figure, shown) =
+                (&self.problem.figures[extreme.number], values[extreme.number].value);
+            let is_there = |kink: &&Kink| match &figure.of {
+                Of::Boundary(name) => kink.boundary == *name,
+                _ => true,
+            };
+            let kinks = kinks.iter().filter(is_there).filter(|_| figure.is_pressure());
+            let Some(kink) = kinks.max_by(|a, b| a.pressure.total_cmp(&b.pressure)) else {
+                continue;
+            };
+            extreme.growth = (kink.pressure - shown).max(0.0);
+            if extreme.growth > SEEN.min(0.5 * accuracy) * shown {
+                let place = self.problem.mesh().place(kink.at);
+                extreme.singular =
+                    Some(format!("a kink of the gap of `{}` at {place}", kink.boundary));
+                extreme.growth = f64::INFINITY;
+            }
+        }
     }
 
     /// Marks the extreme stresses in triangles near a jump of a load as not resolved: fitted strains overshoot there by the same
@@ -119,18 +146,10 @@ impl<'a> Extremes<'a> {
                 true if extreme.is_known() => {
                     extreme.unresolved = Some("it does not converge over the meshes".to_owned())
                 }
-                false if !measured.bars.is_empty() => extreme.singular = None,
+                false if !measured.bars.is_empty() && extreme.growth.is_finite() => {
+                    extreme.singular = None
+                }
                 _ => {}
-            }
-            let shows_table = |of: &Boundary| {
-                let is_other = matches!(&part.of, Of::Boundary(name) if *name != of.name);
-                !is_other && of.gap().is_some_and(|gap| gap.distance.has_kinks_in_space())
-            };
-            if let Some(reason) = &mut extreme.unresolved
-                && part.is_pressure()
-                && problem.scene().boundaries.iter().any(shows_table)
-            {
-                *reason += &format!(": {KINKS_OF_TABLE}");
             }
         }
         all.extend(extremes.unresolved_lengths(state));
@@ -154,6 +173,7 @@ impl<'a> Extremes<'a> {
                 at: [f64::NAN; 2],
                 singular: None,
                 unresolved: Some(reason),
+                growth: 0.0,
             })
         };
         let lengths = self.problem.figures.iter().enumerate();
@@ -170,7 +190,11 @@ impl<'a> Extremes<'a> {
         };
         let points = points.iter().filter(|of| !of.is_open || !presses(of.at)).cloned();
         let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points), EDGES));
-        extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
+        let named = |(extreme, singular): (&Extreme, Option<String>)| Extreme {
+            singular: extreme.singular.clone().or(singular),
+            ..extreme.clone()
+        };
+        extremes.map(named).collect()
     }
 
     /// Per extreme: the name of the nearest of the `points` of the boundary within some `edges`. A stress that is large

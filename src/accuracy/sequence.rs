@@ -13,7 +13,11 @@
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
 use super::{Answer, Extreme, sizes::size_at};
-use crate::advice::SEEN;
+use crate::{
+    advice::SEEN,
+    observe::{ContactRow, rows_of},
+};
+use rustc_hash::FxHashMap as HashMap;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The safety factor of a bar, and the larger one of the bar of a stress: on 40 bodies of a user 10 % of the bars of
@@ -73,34 +77,79 @@ impl<'a> Sequence<'a> {
         self.rate
     }
 
-    /// The bar with the factor `safety`, from the `difference` of a figure between an answer and the finest one.
-    fn bar(&self, safety: f64, difference: impl Fn(&Answer, &Answer) -> f64) -> f64 {
-        let [coarser @ .., finest] = &self.answers[..] else { return 0.0 };
-        let (before, from_answer) = coarser.split_at(self.answer);
-        let weighted = before.iter().map(|answer| {
-            let ratio = if answer.error > from_answer[0].error {
-                from_answer[0].error / answer.error
-            } else {
-                1.0
-            };
-            ratio * ratio * difference(answer, finest)
+    /// The bar with the factor `safety`, from the `difference` of a figure between an answer and the finest one, by their numbers.
+    fn bar(&self, safety: f64, difference: impl Fn(usize, usize) -> f64) -> f64 {
+        let (finest, own) = (self.answers.len() - 1, self.answers[self.answer].error);
+        let weighted = (0..self.answer).map(|before| {
+            let ratio = (own / self.answers[before].error).min(1.0);
+            ratio * ratio * difference(before, finest)
         });
-        let changes = from_answer.iter().map(|answer| difference(answer, finest));
+        let changes = (self.answer..finest).map(|answer| difference(answer, finest));
         let largest = changes.chain(weighted.reduce(f64::min)).fold(0.0, f64::max);
-        let last = difference(self.answers[self.bisected], finest);
+        let last = difference(self.bisected, finest);
         safety * (largest + last * self.rate / (1.0 - self.rate))
     }
 
     /// The bar of the figure `i`, which may be a stress.
     pub(super) fn error(&self, i: usize, is_stress: bool) -> f64 {
-        self.bar(SAFETY[usize::from(is_stress)], |a, b| (a.values[i] - b.values[i]).abs())
+        let value = |k: usize| self.answers[k].values[i];
+        self.bar(SAFETY[usize::from(is_stress)], |a, b| (value(a) - value(b)).abs())
     }
 
-    /// The bar of the figure `i`, a length of contact. A change within the open parts is no error beyond them.
-    pub(super) fn error_of_length(&self, i: usize) -> f64 {
-        let change = |a: &Answer, b: &Answer| (a.values[i] - b.values[i]).abs() - a.open - b.open;
+    /// The bar of the figure `i`, the length of contact of a `foundation` or of all. A change within the open parts is no error beyond
+    /// them.
+    pub(super) fn error_of_length(&self, i: usize, foundation: Option<&str>) -> f64 {
+        let change = |a: usize, b: usize| {
+            let [a, b] = [a, b].map(|k| self.answers[k]);
+            ((a.values[i] - b.values[i]).abs() - a.open - b.open).max(0.0)
+        };
+        let of_lengths = self.error_of_ends() + self.bar(SAFETY[0], change);
+        of_lengths.max(self.grazing_length(foundation))
+    }
+
+    /// The part of this bar that the edges at the ends of contact hide.
+    pub(super) fn error_of_ends(&self) -> f64 {
         SAFETY[0] * self.answers[self.answer].open
-            + self.bar(SAFETY[0], |a, b| change(a, b).max(0.0))
+    }
+
+    /// The largest part of the length of contact on a `foundation`, or on all, that the errors of u and p add or take away, m. The error
+    /// δ of the opening o = g − u·ν may close a node with o ≤ δ; an active node with a pressure at most as large as its error may be open.
+    ///
+    /// Between two nodes the margins o − δ, and p minus its error, are linear: the foundation is open where the first one is positive, and
+    /// closed where the second one is. An edge with one active node counts half in the length.
+    fn grazing_length(&self, foundation: Option<&str>) -> f64 {
+        let rows = |k: usize| {
+            let rows = &self.answers[k].rows[..];
+            foundation.map_or(rows, |name| rows_of(rows, name))
+        };
+        let key = |row: &ContactRow| (row.boundary.clone(), [row.x, row.y].map(f64::to_bits));
+        let by_place = |k: usize| rows(k).iter().map(|row| (key(row), row)).collect();
+        let by_place = (0..self.answers.len()).map(by_place);
+        let by_place: Vec<HashMap<_, &ContactRow>> = by_place.collect();
+        // The margins of the opening and of the pressure; that of the other state is zero without an error.
+        let margins = |row: &ContactRow| {
+            let of: [fn(&ContactRow) -> f64; 2] = [|row| row.gap, |row| row.pressure];
+            of.map(|of| {
+                let key = key(row);
+                let value = |k: usize| by_place[k].get(&key).map(|row| of(row));
+                let change =
+                    |a, b| value(a).zip(value(b)).map_or(0.0, |(a, b): (f64, f64)| (a - b).abs());
+                of(row) - self.bar(SAFETY[0], change)
+            })
+        };
+        let margins = Vec::from_iter(rows(self.answer).iter().map(|row| (row, margins(row))));
+        let [mut closing, mut opening] = [0.0, 0.0];
+        for pair in margins.windows(2) {
+            let [(a, of_a), (b, of_b)] = [pair[0], pair[1]];
+            let length = b.arc_length - a.arc_length;
+            if (&a.boundary, a.part) == (&b.boundary, b.part) && length > 0.0 {
+                let closed = 0.5 * f64::from(a.active + b.active);
+                let [open, sure] = [0, 1].map(|i| positive_part(of_a[i], of_b[i]));
+                closing += length * (1.0 - open - closed).max(0.0);
+                opening += length * (closed - sure).max(0.0);
+            }
+        }
+        f64::max(closing, opening)
     }
 
     /// The bar of the time of ζ_*, and this time, s. It is infinite if the answer or a finer mesh does not stop; `None` if none
@@ -111,10 +160,9 @@ impl<'a> Sequence<'a> {
         if times.clone().any(|time| time.is_none()) {
             return Some([f64::INFINITY, time]);
         }
-        Some([
-            self.bar(SAFETY[0], |a, b| a.stop.zip(b.stop).map_or(0.0, |(a, b)| (a - b).abs())),
-            time,
-        ])
+        let stop = |k: usize| self.answers[k].stop;
+        let change = |a, b| stop(a).zip(stop(b)).map_or(0.0, |(a, b): (f64, f64)| (a - b).abs());
+        Some([self.bar(SAFETY[0], change), time])
     }
 
     /// Does the figure `i` converge over the meshes, an extreme at the place of `extreme` on the finest mesh? Its change per halving of the size
@@ -141,5 +189,14 @@ impl<'a> Sequence<'a> {
             Some(before) => last <= SLOWEST * change(before, finest - 1),
             None => extreme.singular.is_none(),
         }
+    }
+}
+
+/// The part of an edge on which the linear function with these values at its ends is positive.
+fn positive_part(a: f64, b: f64) -> f64 {
+    match [a > 0.0, b > 0.0] {
+        [false, false] => 0.0,
+        [true, true] => 1.0,
+        _ => a.max(b) / (a - b).abs(),
     }
 }

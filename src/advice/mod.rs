@@ -2,18 +2,21 @@
 //!
 //! - [`DiscreteProblem::notes`](crate::problem::DiscreteProblem::notes): the notes before any solve;
 //! - [`Singular`]: points at which stresses grow with every finer mesh; peaks of the pressure that the mesh does not resolve;
+//! - `Kink`: kinks of the gap in closed contact, where the pressure is infinite;
 //! - `unresolved`: edges that must be halved to resolve prescribed displacements and the initial damage;
 //! - `Penetration`: where the body penetrates a foundation between the nodes.
 //!
 //! What crosses the door: `accuracy` marks the mesh at these points, and `command` prints the notes. Nothing here changes an answer.
 
 mod collapse;
+mod kinks;
 mod notes;
 mod peaks;
 mod penetration;
 mod singular;
 mod unresolved;
 
+pub(crate) use kinks::Kink;
 pub use notes::locks;
 pub(crate) use singular::SEEN;
 pub use singular::Singular;

@@ -32,7 +32,7 @@ pub struct Singular {
 }
 
 /// A condition on an edge, and its boundary.
-type Support<'a> = (&'a Condition, &'a Boundary);
+pub(super) type Support<'a> = (&'a Condition, &'a Boundary);
 
 /// A bisection that raises an extreme by less than this fraction shows no singularity.
 pub(crate) const SEEN: f64 = 0.02;
@@ -246,7 +246,7 @@ impl DiscreteProblem {
     }
 
     /// The supported edges of the boundary, each with the support that prescribes most components.
-    fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
+    pub(super) fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
         let mut supports = BTreeMap::new();
         for boundary in &self.scene().boundaries {
             for edge in self.mesh().edges_of(&boundary.name) {

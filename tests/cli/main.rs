@@ -14,6 +14,7 @@ mod export;
 mod extremes;
 mod failing;
 mod fields;
+mod grazing;
 mod plot;
 mod losses;
 mod kept;
