@@ -86,8 +86,6 @@ pub(super) struct Measurement {
     /// Per triangle: its share of the squared error of ζ, and max |Δζ|; empty without damage.
     of_damage: Vec<f64>,
     zeta: Vec<f64>,
-    /// The part of the bar of a length of contact from the edges at its ends, m.
-    of_ends: f64,
     /// The extremes of stresses and pressures on the bisected mesh.
     of_points: Vec<Extreme>,
     /// The mesh bisected everywhere and the answer there.
@@ -232,7 +230,6 @@ impl Measurement {
     /// Sets the bars of the figures that converge over the meshes. Collective.
     fn set_bars_of_settled(&mut self, sequence: &Sequence, coarse: &FewStepRun) {
         let problem = coarse.problem;
-        self.of_ends = sequence.error_of_ends();
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => {
                 let foundation = match &figure.of {
@@ -306,8 +303,6 @@ impl Measurement {
             |probe: &&Probe| figure.is_some_and(|of| of.of == Of::Probe(probe.name.clone()));
         let of_probe = || problem.scene().probes.iter().find(is_at).map(|probe| probe.point);
         match (bar.dimension, of_extreme.or_else(of_probe)) {
-            // The error of u moves the ends further than the edges there hide.
-            (Dimension::ContactLength, _) if bar.bar > 2.0 * self.of_ends => Cause::FIGURE,
             (Dimension::ContactLength, _) => Cause::Ends,
             (Dimension::Zeta, _) => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,

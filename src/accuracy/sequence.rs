@@ -103,13 +103,9 @@ impl<'a> Sequence<'a> {
             let [a, b] = [a, b].map(|k| self.answers[k]);
             ((a.values[i] - b.values[i]).abs() - a.open - b.open).max(0.0)
         };
-        let of_lengths = self.error_of_ends() + self.bar(SAFETY[0], change);
+        let of_ends = SAFETY[0] * self.answers[self.answer].open;
+        let of_lengths = of_ends + self.bar(SAFETY[0], change);
         of_lengths.max(self.grazing_length(foundation))
-    }
-
-    /// The part of this bar that the edges at the ends of contact hide.
-    pub(super) fn error_of_ends(&self) -> f64 {
-        SAFETY[0] * self.answers[self.answer].open
     }
 
     /// The largest part of the length of contact on a `foundation`, or on all, that the errors of u and p add or take away, m. The error
