@@ -7,9 +7,6 @@ use crate::{
     observe::{Bar, ObservedProblem},
 };
 
-/// Why a pressure is not resolved below a gap with a table of the place.
-pub(super) const KINKS_OF_TABLE: &str = "the gap's table has kinks; spline(\"…\") is smooth";
-
 impl LoopState {
     /// Is the required accuracy reached? With the closing line: the mesh, and the errors that are too large. `None` without
     /// a required accuracy. A run that failed has no outcome.
@@ -121,8 +118,8 @@ impl LoopState {
     }
 }
 
-/// Notes on the `extremes` of the `last` state: a pressure that shows the kinks of a table, and a sound body with a singular
-/// stress. On finer meshes this stress grows and may exceed the threshold of the damage, which no error bar shows.
+/// A note on the `extremes` of the `last` state of a sound body with a singular stress. On finer meshes this stress grows and may
+/// exceed the threshold of the damage, which no error bar shows.
 pub fn notes_on_extremes(
     problem: &ObservedProblem,
     last: &Step,
@@ -136,8 +133,5 @@ pub fn notes_on_extremes(
              the damage there, which the error bars do not contain"
         )
     });
-    let mut reasons = extremes.iter().filter_map(|of| of.unresolved.as_ref());
-    let reason = reasons.find(|reason| reason.ends_with(KINKS_OF_TABLE));
-    let kinks = reason.map(|reason| format!("the contact pressure is not resolved ({reason})"));
-    hidden.into_iter().chain(kinks).collect()
+    hidden.into_iter().collect()
 }

@@ -1,8 +1,8 @@
 //! Why the mesh does not determine an extreme stress or pressure of a state, and where contact ends.
 
-use super::{Measured, conclusion::KINKS_OF_TABLE};
+use super::Measured;
 use crate::{
-    advice::Singular,
+    advice::{Kink, SEEN, Singular},
     fem::ON_SIDE,
     mesh::{TIES, distance, extent},
     model::von_mises,
@@ -12,7 +12,6 @@ use crate::{
     },
     petsc::PetscError,
     problem::State,
-    scene::Boundary,
 };
 use rustc_hash::FxHashSet as HashSet;
 
@@ -27,10 +26,11 @@ pub struct Extreme {
     pub at: [f64; 2],
     /// If the stress is singular there, and so grows as the mesh is refined: the reason.
     pub singular: Option<String>,
-    /// If it is the extreme over the directions at a corner: what stresses elsewhere exceed it by, Pa; else 0.
-    pub(super) excess: f64,
     /// If the mesh does not resolve it, as at a peak of the contact pressure: the reason.
     pub unresolved: Option<String>,
+    /// What finer meshes may add to it, Pa: to the extreme over the directions at a corner, what stresses elsewhere exceed it by; to a
+    /// pressure, what kinks of the gap add. It is infinite if no bar can bear it.
+    pub(super) growth: f64,
 }
 
 impl Extreme {
@@ -76,7 +76,7 @@ impl<'a> Extremes<'a> {
         let extreme = |(number, _): (usize, _)| {
             let part = problem.part_of(number, values);
             let (name, at) = (problem.figures[number].name.clone(), values[part].at?);
-            Some(Extreme { number, name, at, singular: None, excess: 0.0, unresolved: None })
+            Some(Extreme { number, name, at, singular: None, unresolved: None, growth: 0.0 })
         };
         let all = figures.filter_map(extreme).collect();
         let (_, ends) = problem.supports.contact.length(&rows);
@@ -89,12 +89,38 @@ impl<'a> Extremes<'a> {
         extremes.find_jumps(&rays);
         let corners = Known::all(problem, &rays, |i| sizes(extremes.stresses[i]));
         for i in 0..extremes.all.len() {
-            extremes.all[i].excess = extremes.excess(&extremes.all[i], values, &corners);
+            extremes.all[i].growth = extremes.excess(&extremes.all[i], values, &corners);
         }
+        extremes.add_kinks(&problem.kinks(state, &extremes.rows), values);
         Ok(extremes)
     }
 
-    /// See [`Extreme::excess`]. Collective.
+    /// Makes the largest pressures infinite that finer meshes exceed at a kink of the gap by a part that is seen, or by half of the accuracy. The bar
+    /// of others bears the part.
+    fn add_kinks(&mut self, kinks: &[Kink], values: &[Value]) {
+        let accuracy = self.problem.scene().accuracy.unwrap_or(1.0);
+        for extreme in &mut self.all {
+            let (figure, shown) =
+                (&self.problem.figures[extreme.number], values[extreme.number].value);
+            let is_there = |kink: &&Kink| match &figure.of {
+                Of::Boundary(name) => kink.boundary == *name,
+                _ => true,
+            };
+            let kinks = kinks.iter().filter(is_there).filter(|_| figure.is_pressure());
+            let Some(kink) = kinks.max_by(|a, b| a.pressure.total_cmp(&b.pressure)) else {
+                continue;
+            };
+            extreme.growth = (kink.pressure - shown).max(0.0);
+            if extreme.growth > SEEN.min(0.5 * accuracy) * shown {
+                let place = self.problem.mesh().place(kink.at);
+                extreme.singular =
+                    Some(format!("a kink of the gap of `{}` at {place}", kink.boundary));
+                extreme.growth = f64::INFINITY;
+            }
+        }
+    }
+
+    /// By what stresses elsewhere exceed the extreme over the directions at a corner, Pa; 0 for others. Collective.
     fn excess(&self, of: &Extreme, values: &[Value], corners: &[Known]) -> f64 {
         let figure = &self.problem.figures[of.number];
         let kinds = ["von_mises_max", "principal_max", "principal_min"];
@@ -162,20 +188,10 @@ impl<'a> Extremes<'a> {
                 true if extreme.is_known() => {
                     extreme.unresolved = Some("it does not converge over the meshes".to_owned())
                 }
-                false if !measured.bars.is_empty() => {
+                false if !measured.bars.is_empty() && extreme.growth.is_finite() => {
                     (extreme.singular, extreme.unresolved) = (None, None);
                 }
                 _ => {}
-            }
-            let shows_table = |of: &Boundary| {
-                let is_other = matches!(&part.of, Of::Boundary(name) if *name != of.name);
-                !is_other && of.gap().is_some_and(|gap| gap.distance.has_kinks_in_space())
-            };
-            if let Some(reason) = &mut extreme.unresolved
-                && part.is_pressure()
-                && problem.scene().boundaries.iter().any(shows_table)
-            {
-                *reason += &format!(": {KINKS_OF_TABLE}");
             }
         }
         all.extend(extremes.at_probes(&points));
@@ -202,8 +218,8 @@ impl<'a> Extremes<'a> {
                     name: figure.name.clone(),
                     at,
                     singular: singular.map(|point| point.name.clone()),
-                    excess: 0.0,
                     unresolved: singular.is_none().then_some(reason),
+                    growth: 0.0,
                 },
             )
         };
@@ -226,8 +242,8 @@ impl<'a> Extremes<'a> {
                 name: figure.name.clone(),
                 at: [f64::NAN; 2],
                 singular: None,
-                excess: 0.0,
                 unresolved: Some(reason),
+                growth: 0.0,
             })
         };
         let lengths = self.problem.figures.iter().enumerate();
@@ -239,7 +255,11 @@ impl<'a> Extremes<'a> {
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
         let points = points.iter().filter(|of| !of.is_open || !self.presses(of.at)).cloned();
         let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points)));
-        extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
+        let named = |(extreme, singular): (&Extreme, Option<String>)| Extreme {
+            singular: extreme.singular.clone().or(singular),
+            ..extreme.clone()
+        };
+        extremes.map(named).collect()
     }
 
     fn presses(&self, [x, y]: [f64; 2]) -> bool {

@@ -237,13 +237,15 @@ impl Measurement {
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
             dimension => {
-                let excess = coarse.extremes.all.iter().find(|of| of.number == i);
+                let extreme = coarse.extremes.all.iter().find(|of| of.number == i);
                 sequence.error(i, matches!(dimension, Dimension::Stress))
-                    + excess.map_or(0.0, |of| of.excess)
+                    + extreme.map_or(0.0, |of| of.growth)
             }
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
         let Measured { bars, not_converged, .. } = &mut self.result;
+        let infinite = coarse.extremes.all.iter().filter(|of| of.growth.is_infinite());
+        not_converged.extend(infinite.map(|of| of.name.clone()));
         *bars = problem.bars(&errors, &coarse.scales(not_converged));
         bars.retain(|bar| !not_converged.contains(&bar.name));
         problem.join_bars(bars, &coarse.outcome.last.figures);

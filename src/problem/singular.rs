@@ -36,7 +36,7 @@ pub struct Singular {
 }
 
 /// A condition on an edge, and its boundary.
-type Support<'a> = (&'a Condition, &'a Boundary);
+pub(super) type Support<'a> = (&'a Condition, &'a Boundary);
 
 /// A sector of one material at a corner.
 #[derive(Debug, Clone)]
@@ -344,7 +344,7 @@ impl DiscreteProblem {
     }
 
     /// The supported edges of the boundary, each with the support that prescribes most components.
-    fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
+    pub(crate) fn supports_of_edges(&self) -> BTreeMap<[usize; 2], Support<'_>> {
         let mut supports = BTreeMap::new();
         for boundary in &self.scene().boundaries {
             for edge in self.mesh().edges_of(&boundary.name) {

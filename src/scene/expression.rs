@@ -3,6 +3,7 @@
 mod breaks;
 mod degree;
 mod interval;
+mod kinks;
 mod parser;
 mod table;
 
@@ -108,7 +109,7 @@ enum Instruction {
     Number(f64),
     /// x, y or t, by its index.
     Variable(usize),
-    Unary(fn(f64) -> f64, Enclosure),
+    Unary(fn(f64) -> f64, Enclosure, Rule),
     Binary(fn(f64, f64) -> f64, Enclosure2, Rule),
     Compare(fn(&f64, &f64) -> bool),
     /// `if`.
@@ -193,7 +194,7 @@ impl Expression {
             stack[height] = match instruction {
                 Number(value) => *value,
                 Variable(i) => variables[*i],
-                Unary(apply, _) => apply(stack[height]),
+                Unary(apply, ..) => apply(stack[height]),
                 Binary(apply, ..) => apply(stack[height], stack[height + 1]),
                 Compare(holds) => truth(stack[height], stack[height + 1], |a, b| holds(&a, &b)),
                 Choose if stack[height].is_nan() => f64::NAN,
@@ -216,18 +217,6 @@ impl Expression {
     /// Whether the expression contains t.
     pub fn depends_on_time(&self) -> bool {
         self.program.iter().any(|instruction| matches!(instruction, Variable(2)))
-    }
-
-    /// Does the expression contain a `table` of x or y, which has kinks at its points?
-    pub fn has_kinks_in_space(&self) -> bool {
-        // Per value on the stack: does it depend on x or y?
-        let mut stack = Vec::new();
-        self.program.iter().any(|instruction| {
-            let arguments = stack.split_off(stack.len() - instruction.takes());
-            let in_space = matches!(instruction, Variable(0 | 1)) || arguments.contains(&true);
-            stack.push(in_space);
-            in_space && matches!(instruction, Instruction::Table(table) if table.has_kinks())
-        })
     }
 
     /// Whether the expression contains x or y.

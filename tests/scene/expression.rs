@@ -669,19 +669,33 @@ fn the_breaks_of_a_spline_are_its_jumps() {
     assert!(near(0.7005) && breaks.iter().all(|t| (0.69..0.71).contains(t)), "{breaks:?}");
 }
 
-/// Only a table of the place has kinks in space, at points between its ends.
+/// Kinks along a line are found by the form of an expression, wherever they are, and smooth expressions have none.
 #[test]
-fn kinks_in_space_are_those_of_tables_of_the_place() {
-    let rows = "0,0\n1,1\n2,3\n";
-    for (rows, text, expected) in [
-        (rows, "table('load.csv', x)", true),
-        (rows, "-t*table('load.csv', 2*sqrt(x^2 + y^2)) + 1", true),
-        (rows, "if(t < 1, 0, table('load.csv', y))", true),
-        (rows, "spline('load.csv', x)", false),
-        (rows, "x + y*table('load.csv')", false),
-        (rows, "x^2 + table('load.csv', 2*t)", false),
-        ("0,0\n2,3\n", "table('load.csv', x)", false),
+fn kinks_along_a_line_are_those_of_the_form() {
+    let rows = "-1,1\n0.2,1\n0.7,3\n2,0\n";
+    for (text, t, expected) in [
+        ("table('load.csv', x)", 0.0, &[(0.2, 4.0), (0.7, -4.0 - 3.0 / 1.3)][..]),
+        ("y + 2*table('load.csv', x + t)", 0.1, &[(0.1, 8.0), (0.6, -8.0 - 6.0 / 1.3)]),
+        ("x + y*table('load.csv')", 0.5, &[]),
+        ("pchip('load.csv', x)", 0.0, &[]),
+        ("spline('load.csv', x)", 0.0, &[]),
+        // The ends of a table.
+        ("pchip('load.csv', 4*x - 1)*0 + spline('load.csv', 3*x)", 0.0, &[(2.0 / 3.0, f64::NAN)]),
+        ("abs(x - 0.3)", 0.0, &[(0.3, 2.0)]),
+        ("abs(x - 0.25*t)", 2.0, &[(0.5, 2.0)]),
+        ("3*max(x^2, 0.5*x) + exp(x)", 0.0, &[(0.5, 1.5)]),
+        ("sqrt((x - 0.6)^2)", 0.0, &[(0.6, 2.0)]),
+        ("if(x < 0.4, 0, x - 0.4)", 0.0, &[(0.4, 1.0)]),
+        // Kinks of the form whose slopes agree.
+        ("max(0, x - 0.4)^2", 0.0, &[(0.4, 0.0)]),
+        ("1000*(x - 0.5)^4 + cos(50*x) + sqrt(1 + x) + x^0.5*0", 0.0, &[]),
+        ("max(x, x + y)", 0.0, &[]),
     ] {
-        assert_eq!(table(rows, text).expect(text).has_kinks_in_space(), expected, "{text}");
+        let found = table(rows, text).expect(text).kinks([[0.0, 0.0], [1.0, 0.0]], t);
+        assert_eq!(found.len(), expected.len(), "{text}: {found:?}");
+        for ((s, change), (place, value)) in found.iter().zip(expected) {
+            assert!((s - place).abs() < 1e-8, "{text}: {found:?}");
+            assert!(value.is_nan() || (change - value).abs() < 1e-5, "{text}: {found:?}");
+        }
     }
 }

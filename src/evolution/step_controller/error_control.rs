@@ -166,7 +166,7 @@ impl<'a> ErrorControl<'a> {
         let ratio = |j: usize| {
             let forecast = (ahead * rates[j]).clamp(NEGLIGIBLE_DAMAGE, MAX_FORECAST);
             let reference = match self.expected[j] {
-                expected if expected > 0.0 => damage[j].max(expected),
+                expected if expected > 0.0 => damage[j].max(expected).max(NEGLIGIBLE_DAMAGE),
                 _ => damage[j] + forecast,
             };
             let budget = AIM * self.tolerance * reference;

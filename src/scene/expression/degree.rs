@@ -5,7 +5,7 @@
 
 use super::{
     Expression,
-    Instruction::{Binary, Choose, Variable},
+    Instruction::{self, Binary, Choose, Variable},
     interval::Interval,
 };
 
@@ -18,7 +18,24 @@ pub(super) enum Rule {
     Power,
     Smaller,
     Larger,
+    /// Not differentiable at 0, as `abs`.
+    KinkAtZero,
     Other,
+}
+
+impl Instruction {
+    /// The argument that `min`, `max` or `if` takes within these bounds `of` its arguments, if they decide.
+    pub(super) fn taken(&self, of: &[Interval]) -> Option<usize> {
+        match (self, of) {
+            (Binary(.., Rule::Smaller), [p, q]) if p[1] <= q[0] => Some(0),
+            (Binary(.., Rule::Smaller), [p, q]) if q[1] <= p[0] => Some(1),
+            (Binary(.., Rule::Larger), [p, q]) if p[0] >= q[1] => Some(0),
+            (Binary(.., Rule::Larger), [p, q]) if q[0] >= p[1] => Some(1),
+            (Choose, [[low, high], ..]) if *low > 0.0 || *high < 0.0 => Some(1),
+            (Choose, [[0.0, 0.0], ..]) => Some(2),
+            _ => None,
+        }
+    }
 }
 
 impl Expression {
@@ -34,32 +51,38 @@ impl Expression {
     /// # Ok::<(), signorini::scene::ExpressionError>(())
     /// ```
     pub fn degree(&self, variables: [[f64; 2]; 3]) -> Option<u32> {
-        let (mut bounds, mut degrees) = (Vec::<Interval>::new(), Vec::new());
-        for instruction in &self.program {
-            let first = bounds.len() - instruction.takes();
-            let (of, degrees_of) = (bounds.split_off(first), degrees.split_off(first));
-            let value = instruction.enclosed(variables, &of);
-            degrees.push(match (instruction, &degrees_of[..], &of[..]) {
+        self.by_form::<Option<u32>>(variables, |instruction, value, degrees, of| {
+            match (instruction, degrees, of) {
                 _ if value[0] == value[1] => Some(0),
                 (Variable(0 | 1), ..) => Some(1),
                 (_, degrees, _) if degrees.iter().all(|degree| *degree == Some(0)) => Some(0),
-                (Binary(.., Rule::Sum), [a, b], _) => a.zip(*b).map(|(a, b): (u32, u32)| a.max(b)),
+                (Binary(.., Rule::Sum), [a, b], _) => a.zip(*b).map(|(a, b)| a.max(b)),
                 (Binary(.., Rule::Product), [a, b], _) => a.zip(*b).map(|(a, b)| a + b),
                 (Binary(.., Rule::Quotient), [a, Some(0)], _) => *a,
                 (Binary(.., Rule::Power), [a, _], [_, [n, m]]) => {
                     let is_whole = n == m && n.fract() == 0.0 && (0.0..=9.0).contains(n);
                     a.filter(|_| is_whole).map(|a| a * *n as u32)
                 }
-                (Binary(.., Rule::Smaller), [a, _], [p, q]) if p[1] <= q[0] => *a,
-                (Binary(.., Rule::Smaller), [_, b], [p, q]) if q[1] <= p[0] => *b,
-                (Binary(.., Rule::Larger), [a, _], [p, q]) if p[0] >= q[1] => *a,
-                (Binary(.., Rule::Larger), [_, b], [p, q]) if q[0] >= p[1] => *b,
-                (Choose, [_, a, _], [[low, high], ..]) if *low > 0.0 || *high < 0.0 => *a,
-                (Choose, [_, _, b], [[0.0, 0.0], ..]) => *b,
-                _ => None,
-            });
+                (_, degrees, of) => instruction.taken(of).and_then(|i| degrees[i]),
+            }
+        })?
+    }
+
+    /// The property of the expression in the box that follows, instruction by instruction, from the bounds of the value, the
+    /// properties of the arguments and their bounds.
+    pub(super) fn by_form<T>(
+        &self,
+        variables: [Interval; 3],
+        property: impl Fn(&Instruction, Interval, &[T], &[Interval]) -> T,
+    ) -> Option<T> {
+        let (mut bounds, mut properties) = (Vec::<Interval>::new(), Vec::new());
+        for instruction in &self.program {
+            let first = bounds.len() - instruction.takes();
+            let (of, properties_of) = (bounds.split_off(first), properties.split_off(first));
+            let value = instruction.enclosed(variables, &of);
+            properties.push(property(instruction, value, &properties_of, &of));
             bounds.push(value);
         }
-        degrees.pop().flatten()
+        properties.pop()
     }
 }

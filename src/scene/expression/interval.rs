@@ -62,7 +62,7 @@ impl Instruction {
         match (self, arguments) {
             (Number(value), _) => hull([*value]),
             (Variable(i), _) => variables[*i],
-            (Unary(apply, enclose), [a, ..]) => enclose(*apply, *a),
+            (Unary(apply, enclose, _), [a, ..]) => enclose(*apply, *a),
             (Binary(apply, enclose, _), [a, b, ..]) => enclose(*apply, *a, *b),
             (Compare(holds), [a, b, ..]) => compared(*holds, *a, *b),
             (Choose, [[0.0, 0.0], _, otherwise, ..]) => *otherwise,

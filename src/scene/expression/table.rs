@@ -103,9 +103,18 @@ impl Table {
         Some([u, 3.0 * rise - 2.0 * u - v, u + v - 2.0 * rise])
     }
 
-    /// Is it linear between more than two points?
-    pub(super) fn has_kinks(&self) -> bool {
-        self.slopes.is_empty() && self.points.len() > 2
+    /// May it have a kink or a jump in an interval? It may at its ends, at jumps, and at all points if it is linear between them.
+    pub(super) fn bends_in(&self, [low, high]: [f64; 2]) -> bool {
+        let first = self.points.partition_point(|[a, _]| *a < low);
+        let last = self.points.partition_point(|[a, _]| *a <= high);
+        let is_smooth = |i: usize| {
+            let [before, next] = [i.checked_sub(1), Some(i + 1)].map(|k| self.points.get(k?));
+            let is_within = before
+                .zip(next)
+                .is_some_and(|(p, q)| p[0] < self.points[i][0] && self.points[i][0] < q[0]);
+            is_within && !self.slopes.is_empty()
+        };
+        !(first..last).all(is_smooth)
     }
 
     /// Values whose range contains all f(a) in an interval: the values at its ends, at the points in it, and where a cubic
