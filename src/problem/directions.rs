@@ -193,7 +193,7 @@ impl Side {
     /// (ε_rr, u_θ/r, 0, 0) without their value at the corner. They are limits at the corner, by two points near it.
     fn values(&self, corner: [f64; 2], scene: &Scene, t: f64, is_last: bool) -> Vector4<f64> {
         /// The distance of the nearer point, over the length of the edge.
-        const NEAR: f64 = 1e-5;
+        const TO_LIMIT: f64 = 1e-5;
         let edge = [0, 1].map(|k| self.end[k] - corner[k]);
         let at = |part: f64| {
             let [x, y] = [0, 1].map(|k| corner[k] + part * edge[k]);
@@ -215,7 +215,7 @@ impl Side {
             let boundaries = self.boundaries.iter().map(|&number| &scene.boundaries[number]);
             boundaries.flat_map(|of| &of.conditions).map(value).sum::<Vector4<f64>>()
         };
-        2.0 * at(NEAR) - at(2.0 * NEAR)
+        2.0 * at(TO_LIMIT) - at(2.0 * TO_LIMIT)
     }
 
     /// (0, 0, σ_rθ, σ_θθ), Pa, of a traction on the side, Pa.
