@@ -90,7 +90,7 @@ impl<'a> Extremes<'a> {
         let triangles = body.mesh.triangles.iter();
         let next = triangles.filter(|triangle| triangle.iter().any(|&vertex| near[vertex]));
         let next: HashSet<usize> = next.flatten().copied().collect();
-        let points = nodal.points.iter().filter(|of| of.ends.iter().any(|end| next.contains(end)));
+        let points = nodal.all().filter(|of| of.ends.iter().any(|end| next.contains(end)));
         let places = Vec::from_iter(points.map(|point| point.at));
         for of in &mut self.all {
             let is_there = body.comm().any(places.contains(&of.at));
@@ -170,7 +170,11 @@ impl<'a> Extremes<'a> {
         };
         let points = points.iter().filter(|of| !of.is_open || !presses(of.at)).cloned();
         let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points), EDGES));
-        extremes.map(|(extreme, singular)| Extreme { singular, ..extreme.clone() }).collect()
+        let of = |(extreme, near): (&Extreme, Option<String>)| {
+            let singular = near.filter(|_| !self.problem.figures[extreme.number].is_away());
+            Extreme { singular, ..extreme.clone() }
+        };
+        extremes.map(of).collect()
     }
 
     /// Per extreme: the name of the nearest of the `points` of the boundary within some `edges`. A stress that is large

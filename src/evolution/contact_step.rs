@@ -37,8 +37,8 @@ pub use accuracy::Accuracy;
 use certificate::active_bounds;
 
 use super::{
-    DiscreteProblem, LoadCase, ObservedProblem, RunError, RunOptions, State, Step, StepFailure,
-    StepRecord, agreed, extrapolation::Extrapolation,
+    DiscreteProblem, FirstContact, LoadCase, ObservedProblem, RunError, RunOptions, State, Step,
+    StepFailure, StepRecord, agreed, extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
@@ -251,6 +251,7 @@ impl<'a> ContactStep<'a> {
             return Err(RunError::Step { step, time, source });
         }
         Ok(Step {
+            first_contact: FirstContact::of(&observation, time),
             strains: observation.strained.strains,
             state,
             record,

@@ -1,6 +1,6 @@
 //! Stresses at the nodes, as engineers look at them: continuous within a material.
 
-use super::{ObservedProblem, Value, figures::greatest};
+use super::{ObservedProblem, Value, away::Region, figures::greatest};
 use crate::{
     fem::{Fits, Partition, Patches, for_elements},
     model::{Material, von_mises},
@@ -20,19 +20,22 @@ use std::sync::Arc;
 pub struct NodalStress {
     patches: Arc<Patches>,
     pub(crate) points: Vec<Point>,
+    /// The points of this rank away from singular points, and those where sides of triangles enter this region.
+    pub(crate) away: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
     materials: Vec<(Material, Matrix3<f64>)>,
 }
 
-/// A node, as a point of one material.
-#[derive(Debug)]
+/// A node, or another point of a side, as a point of one material.
+#[derive(Debug, Clone)]
 pub(crate) struct Point {
     node: usize,
     pub(crate) material: usize,
     pub(crate) at: [f64; 2],
-    /// The vertices whose fits give its strain: itself, or the ends of its side.
+    /// The vertices whose fits give its strain, itself or the ends of its side, and the weight of the second one.
     pub(crate) ends: [usize; 2],
+    part: f64,
 }
 
 /// The strains and ζ from which the stresses of a state are computed.
@@ -45,10 +48,13 @@ pub struct Strained {
 }
 
 impl NodalStress {
-    /// The nodes of the body of `problem`. Collective.
-    pub fn new(problem: &DiscreteProblem) -> Self {
+    /// The nodes of the body of `problem`, and the points of its `region` away from singular points. Collective.
+    pub(super) fn new(problem: &DiscreteProblem, region: &Region) -> Self {
         let body = &problem.body;
-        let unset = |&at: &[f64; 2]| Point { node: 0, material: usize::MAX, at, ends: [0; 2] };
+        let unset = |&at: &[f64; 2]| {
+            let (node, material) = (0, usize::MAX);
+            Point { node, material, at, ends: [0; 2], part: 0.5 }
+        };
         let mut points: Vec<Point> = body.nodes.points.iter().map(unset).collect();
         let mut copies = HashMap::default();
         let mut cells = Vec::new();
@@ -57,7 +63,8 @@ impl NodalStress {
             let material = body.material(t);
             for (i, &node) in nodes[count * t..count * (t + 1)].iter().enumerate() {
                 let ends = [vertices[i % 3], vertices[if i < 3 { i } else { (i + 1) % 3 }]];
-                let point = Point { node, material, at: body.nodes.points[node], ends };
+                let at = body.nodes.points[node];
+                let point = Point { node, material, at, ends, part: 0.5 };
                 let index = match points[node].material {
                     usize::MAX => node,
                     first if first == material => node,
@@ -73,7 +80,12 @@ impl NodalStress {
             }
         }
         let materials = problem.elasticity.materials().map(|m| (*m, m.stiffness())).collect();
-        Self { patches: Arc::clone(body.patches()), points, cells, materials }
+        let is_away = |of: &&Point| region.contains(of.material, of.at);
+        let mut away: Vec<Point> = points.iter().filter(is_away).cloned().collect();
+        for of in cells.chunks_exact(count).map(|of| of.iter().map(|&index| &points[index])) {
+            away.extend(crossings(&Vec::from_iter(of), region));
+        }
+        Self { patches: Arc::clone(body.patches()), points, away, cells, materials }
     }
 
     /// The node of each point.
@@ -106,6 +118,11 @@ impl NodalStress {
         Ok(self.points.iter().map(|point| self.stress(point, strained, &fits)).collect())
     }
 
+    /// All points, of both lists.
+    pub(crate) fn all(&self) -> impl Iterator<Item = &Point> {
+        self.points.iter().chain(&self.away)
+    }
+
     /// The stress at a point, with the fits of the strains.
     #[inline(always)]
     fn stress(&self, point: &Point, strained: &Strained, fits: &[Fits]) -> [f64; 4] {
@@ -116,48 +133,77 @@ impl NodalStress {
         };
         let strain = match first == last {
             true => fits.at_vertex(first),
-            false => 0.5 * (strain(first) + strain(last)),
+            false => (1.0 - point.part) * strain(first) + point.part * strain(last),
         };
         let (material, stiffness) = &self.materials[point.material];
-        let zeta = 0.5 * (strained.zeta[first] + strained.zeta[last]);
+        let zeta = (1.0 - point.part) * strained.zeta[first] + point.part * strained.zeta[last];
         let stress = stiffness * strain * zeta.clamp(strained.threshold, 1.0);
         [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
     }
 }
 
+/// The points at which the sides of an element with these points enter or leave the region. The midside of a quadratic element
+/// divides its side into two straight parts.
+fn crossings(element: &[&Point], region: &Region) -> Vec<Point> {
+    let mut found = Vec::new();
+    for i in 0..3 {
+        let (first, last) = (element[i], element[(i + 1) % 3]);
+        let middle = element.get(3 + i).copied();
+        let side: Vec<_> = [Some(first), middle, Some(last)].into_iter().flatten().collect();
+        for (k, pair) in side.windows(2).enumerate() {
+            let [p, q] = [pair[0].at, pair[1].at];
+            found.extend(region.crossings(first.material, [p, q]).into_iter().map(|tau| Point {
+                node: first.node,
+                material: first.material,
+                at: [0, 1].map(|axis| p[axis] + tau * (q[axis] - p[axis])),
+                ends: [first.ends[0], last.ends[0]],
+                part: (k as f64 + tau) / (side.len() - 1) as f64,
+            }));
+        }
+    }
+    found
+}
+
 impl ObservedProblem {
     /// The nodes of the body as points of stresses. Collective.
     pub fn nodal_stress(&self) -> &Arc<NodalStress> {
-        self.nodal_stress.get_or_init(|| NodalStress::new(self).into())
+        self.nodal_stress.get_or_init(|| NodalStress::new(self, &self.away).into())
     }
 
-    /// The largest von Mises stress and σ₁, and the smallest σ₂, Pa, of the body and of each of several materials. Collective.
+    /// The largest von Mises stress and σ₁, and the smallest σ₂, Pa, of the body and of each of several materials; then the
+    /// same away from singular points. Collective.
     ///
     /// # Errors
     /// PETSc failed.
-    pub(crate) fn extreme_stresses(&self, of: &Strained) -> Result<Vec<[Value; 3]>, PetscError> {
+    pub(crate) fn extreme_stresses(
+        &self,
+        of: &Strained,
+    ) -> Result<[Vec<[Value; 3]>; 2], PetscError> {
         let (nodal, body) = (self.nodal_stress(), &self.body);
         let fits = nodal.patches.fits(&of.strains, Some(&body.vertices.partition))?;
-        let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; nodal.materials.len()];
-        for point in &nodal.points {
-            let stress = nodal.stress(point, of, &fits);
-            let [most, least] = principal(stress);
-            let values = [von_mises(stress), most, -least];
-            for (largest, value) in largest[point.material].iter_mut().zip(values) {
-                if value >= largest.0 {
-                    *largest = (value, point.at);
+        let comm = body.comm();
+        let extremes = |points: &[Point]| {
+            let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; nodal.materials.len()];
+            for point in points {
+                let stress = nodal.stress(point, of, &fits);
+                let [most, least] = principal(stress);
+                let values = [von_mises(stress), most, -least];
+                for (largest, value) in largest[point.material].iter_mut().zip(values) {
+                    if value >= largest.0 {
+                        *largest = (value, point.at);
+                    }
                 }
             }
-        }
-        let comm = body.comm();
-        let extremes = |parts: &[[(f64, [f64; 2]); 3]]| {
-            let [von_mises, most, least] =
-                [0, 1, 2].map(|k| greatest(comm, parts.iter().map(|part| part[k])));
-            [von_mises, most, Value { value: -least.value, ..least }]
+            let extremes = |parts: &[[(f64, [f64; 2]); 3]]| {
+                let [von_mises, most, least] =
+                    [0, 1, 2].map(|k| greatest(comm, parts.iter().map(|part| part[k])));
+                [von_mises, most, Value { value: -least.value, ..least }]
+            };
+            let parts = if self.materials.len() > 1 { &self.materials[..] } else { &[] };
+            let parts = parts.iter().map(|(number, _)| extremes(&largest[*number..=*number]));
+            [extremes(&largest)].into_iter().chain(parts).collect()
         };
-        let parts = if self.materials.len() > 1 { &self.materials[..] } else { &[] };
-        let parts = parts.iter().map(|(number, _)| extremes(&largest[*number..=*number]));
-        Ok([extremes(&largest)].into_iter().chain(parts).collect())
+        Ok([extremes(&nodal.points), extremes(&nodal.away)])
     }
 }
 
