@@ -189,7 +189,9 @@ fn a_foundation_that_comes_from_far_away_leaves_the_bars_as_they_are() {
         let travel = crate::support::figures(&problem, &outcome.last)["bottom.travel"];
         assert!((travel - far - 0.01).abs() < 1e-12, "{travel}");
         assert!(outcome.bars.iter().all(|bar| bar.name != "bottom.travel"));
-        outcome.bars.iter().map(|bar| (bar.name.clone(), bar.relative())).collect::<Vec<_>>()
+        // Only the foundation that is far away has a first contact.
+        let bars = outcome.bars.iter().filter(|bar| !bar.name.ends_with("first_contact"));
+        bars.map(|bar| (bar.name.clone(), bar.relative())).collect::<Vec<_>>()
     });
     for ((name, near), (_, far)) in bars[0].iter().zip(&bars[1]) {
         assert!((near - far).abs() <= 1e-6 * near.max(1e-9), "{name}: {near}, {far}");
