@@ -1,14 +1,15 @@
 //! The region that is at least the length `away` of the scene from all singular points.
 //!
 //! The stress is steep around a singular point C, so its extremes lie on the circle of the radius `away` around it. They are
-//! taken at the nodes outside all circles, and where a straight part P + τ(Q − P) of a side of a triangle crosses one:
+//! taken at the nodes outside all circles, where a straight part P + τ(Q − P) of a side of a triangle crosses one, and in the
+//! middles of the arcs between:
 //!
 //! |P + τ(Q − P) − C| = `away`,   0 < τ < 1.
 //!
 //! The region is the same on all meshes, and at all times: a corner of a foundation counts even while it is in contact.
 
 use crate::{
-    mesh::{TIES, distance},
+    mesh::{TIES, distance, twice_area},
     problem::DiscreteProblem,
     scene::SceneError,
 };
@@ -66,23 +67,45 @@ impl Region {
         self.centres.iter().all(|&centre| distance(centre, at) >= TIES * radius)
     }
 
-    /// The τ at which the segment from p to q in the material enters or leaves the region.
-    pub(super) fn crossings(&self, material: usize, [p, q]: [[f64; 2]; 2]) -> Vec<f64> {
+    /// The points of the circles on the sides of a convex polygon in the material, and in the middles of the arcs between two of
+    /// them within the polygon.
+    pub(super) fn on_circles(&self, material: usize, polygon: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let Some(Some(radius)) = self.radii.get(material) else { return Vec::new() };
-        let along = [q[0] - p[0], q[1] - p[1]];
-        let square = along[0] * along[0] + along[1] * along[1];
-        let at = |part: f64| [p[0] + part * along[0], p[1] + part * along[1]];
-        let of_circle = |&[x, y]: &[f64; 2]| {
-            let from = [p[0] - x, p[1] - y];
-            let middle = -(from[0] * along[0] + from[1] * along[1]) / square;
-            let [dx, dy] = [0, 1].map(|k| from[k] + middle * along[k]);
-            // NaN if the segment passes by.
-            let half = ((radius * radius - dx * dx - dy * dy) / square).sqrt();
-            [middle - half, middle + half]
-        };
-        let parts = self.centres.iter().flat_map(of_circle);
-        parts.filter(|&of| of > 0.0 && of < 1.0 && self.contains(material, at(of))).collect()
+        let sides = || (0..polygon.len()).map(|i| [polygon[i], polygon[(i + 1) % polygon.len()]]);
+        let is_inside = |at: &[f64; 2]| sides().all(|[p, q]| twice_area(p, q, *at) >= 0.0);
+        let mut found = Vec::new();
+        for &centre in &self.centres {
+            let ends: Vec<_> = sides().flat_map(|side| crossings(side, centre, *radius)).collect();
+            let pairs =
+                ends.iter().enumerate().flat_map(|(i, p)| ends[..i].iter().map(move |q| [p, q]));
+            let middle = |[p, q]: [&[f64; 2]; 2]| {
+                let [x, y] = [0, 1].map(|k| p[k] + q[k] - 2.0 * centre[k]);
+                let scale = radius / x.hypot(y);
+                [centre[0] + scale * x, centre[1] + scale * y]
+            };
+            let middles: Vec<_> = pairs.map(middle).filter(is_inside).collect();
+            found.extend(ends.into_iter().chain(middles));
+        }
+        found.retain(|at| self.contains(material, *at));
+        found
     }
+}
+
+/// The points at which the segment from p to q crosses a circle.
+fn crossings(
+    [p, q]: [[f64; 2]; 2],
+    [x, y]: [f64; 2],
+    radius: f64,
+) -> impl Iterator<Item = [f64; 2]> {
+    let (from, along) = ([p[0] - x, p[1] - y], [q[0] - p[0], q[1] - p[1]]);
+    let square = along[0] * along[0] + along[1] * along[1];
+    let middle = -(from[0] * along[0] + from[1] * along[1]) / square;
+    let [dx, dy] = [0, 1].map(|k| from[k] + middle * along[k]);
+    // NaN if the segment passes by.
+    let half = ((radius * radius - dx * dx - dy * dy) / square).sqrt();
+    let parts =
+        [middle - half, middle + half].into_iter().filter(|part| *part > 0.0 && *part < 1.0);
+    parts.map(move |part| [p[0] + part * along[0], p[1] + part * along[1]])
 }
 
 impl DiscreteProblem {

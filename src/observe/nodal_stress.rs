@@ -3,6 +3,7 @@
 use super::{ObservedProblem, Value, away::Region, figures::greatest};
 use crate::{
     fem::{Fits, Partition, Patches, for_elements},
+    mesh::twice_area,
     model::{Material, von_mises},
     petsc::PetscError,
     problem::{DiscreteProblem, State},
@@ -20,22 +21,23 @@ use std::sync::Arc;
 pub struct NodalStress {
     patches: Arc<Patches>,
     pub(crate) points: Vec<Point>,
-    /// The points of this rank away from singular points, and those where sides of triangles enter this region.
+    /// The points of this rank away from singular points, and those of its triangles on the border of this region.
     pub(crate) away: Vec<Point>,
     /// The points of this rank's triangles, each with the nodes of an element of u.
     pub cells: Vec<usize>,
     materials: Vec<(Material, Matrix3<f64>)>,
 }
 
-/// A node, or another point of a side, as a point of one material.
+/// A node, or another point of a triangle, as a point of one material.
 #[derive(Debug, Clone)]
 pub(crate) struct Point {
     node: usize,
     pub(crate) material: usize,
     pub(crate) at: [f64; 2],
-    /// The vertices whose fits give its strain, itself or the ends of its side, and the weight of the second one.
-    pub(crate) ends: [usize; 2],
-    part: f64,
+    /// The vertices whose fits give its strain, and their weights: itself alone, the ends of its side, or those of its triangle with
+    /// the barycentric coordinates.
+    pub(crate) ends: [usize; 3],
+    weights: [f64; 3],
 }
 
 /// The strains and ζ from which the stresses of a state are computed.
@@ -53,7 +55,7 @@ impl NodalStress {
         let body = &problem.body;
         let unset = |&at: &[f64; 2]| {
             let (node, material) = (0, usize::MAX);
-            Point { node, material, at, ends: [0; 2], part: 0.5 }
+            Point { node, material, at, ends: [0; 3], weights: [1.0, 0.0, 0.0] }
         };
         let mut points: Vec<Point> = body.nodes.points.iter().map(unset).collect();
         let mut copies = HashMap::default();
@@ -62,9 +64,10 @@ impl NodalStress {
         for (t, vertices) in body.mesh.triangles.iter().enumerate() {
             let material = body.material(t);
             for (i, &node) in nodes[count * t..count * (t + 1)].iter().enumerate() {
-                let ends = [vertices[i % 3], vertices[if i < 3 { i } else { (i + 1) % 3 }]];
-                let at = body.nodes.points[node];
-                let point = Point { node, material, at, ends, part: 0.5 };
+                let (at, first) = (body.nodes.points[node], vertices[i % 3]);
+                let ends = [first, vertices[if i < 3 { i } else { (i + 1) % 3 }], first];
+                let weights = if i < 3 { [1.0, 0.0, 0.0] } else { [0.5, 0.5, 0.0] };
+                let point = Point { node, material, at, ends, weights };
                 let index = match points[node].material {
                     usize::MAX => node,
                     first if first == material => node,
@@ -83,7 +86,7 @@ impl NodalStress {
         let is_away = |of: &&Point| region.contains(of.material, of.at);
         let mut away: Vec<Point> = points.iter().filter(is_away).cloned().collect();
         for of in cells.chunks_exact(count).map(|of| of.iter().map(|&index| &points[index])) {
-            away.extend(crossings(&Vec::from_iter(of), region));
+            away.extend(on_circles(&Vec::from_iter(of), region));
         }
         Self { patches: Arc::clone(body.patches()), points, away, cells, materials }
     }
@@ -126,42 +129,42 @@ impl NodalStress {
     /// The stress at a point, with the fits of the strains.
     #[inline(always)]
     fn stress(&self, point: &Point, strained: &Strained, fits: &[Fits]) -> [f64; 4] {
-        let ([x, y], [first, last], fits) = (point.at, point.ends, &fits[point.material]);
-        let strain = |end: usize| {
+        let ([x, y], [first, ..], fits) = (point.at, point.ends, &fits[point.material]);
+        let used =
+            || point.ends.into_iter().zip(point.weights).filter(|(_, weight)| *weight != 0.0);
+        let value = |(end, weight): (usize, f64)| {
             let [vx, vy] = self.patches.vertices[end];
-            fits.value(end, [x - vx, y - vy])
+            weight * fits.value(end, [x - vx, y - vy])
         };
-        let strain = match first == last {
+        let strain = match point.weights[0] == 1.0 {
             true => fits.at_vertex(first),
-            false => (1.0 - point.part) * strain(first) + point.part * strain(last),
+            false => used().map(value).sum(),
         };
         let (material, stiffness) = &self.materials[point.material];
-        let zeta = (1.0 - point.part) * strained.zeta[first] + point.part * strained.zeta[last];
+        let zeta: f64 = used().map(|(end, weight)| weight * strained.zeta[end]).sum();
         let stress = stiffness * strain * zeta.clamp(strained.threshold, 1.0);
         [stress[0], stress[1], stress[2], material.out_of_plane(&stress)]
     }
 }
 
-/// The points at which the sides of an element with these points enter or leave the region. The midside of a quadratic element
-/// divides its side into two straight parts.
-fn crossings(element: &[&Point], region: &Region) -> Vec<Point> {
-    let mut found = Vec::new();
-    for i in 0..3 {
-        let (first, last) = (element[i], element[(i + 1) % 3]);
-        let middle = element.get(3 + i).copied();
-        let side: Vec<_> = [Some(first), middle, Some(last)].into_iter().flatten().collect();
-        for (k, pair) in side.windows(2).enumerate() {
-            let [p, q] = [pair[0].at, pair[1].at];
-            found.extend(region.crossings(first.material, [p, q]).into_iter().map(|tau| Point {
-                node: first.node,
-                material: first.material,
-                at: [0, 1].map(|axis| p[axis] + tau * (q[axis] - p[axis])),
-                ends: [first.ends[0], last.ends[0]],
-                part: (k as f64 + tau) / (side.len() - 1) as f64,
-            }));
-        }
-    }
-    found
+/// The points of the region's circles in an element with these points: three vertices and, if it is quadratic, the middles of its
+/// sides, which divide them into straight parts.
+fn on_circles(element: &[&Point], region: &Region) -> Vec<Point> {
+    let corners @ [a, b, c] = [0, 1, 2].map(|i| element[i].at);
+    let around = if element.len() > 3 { &[0, 3, 1, 4, 2, 5][..] } else { &[0, 1, 2] };
+    let around = Vec::from_iter(around.iter().map(|&i| element[i].at));
+    let (first, ends) = (element[0], [0, 1, 2].map(|i| element[i].ends[0]));
+    let point = |at| Point {
+        node: first.node,
+        material: first.material,
+        at,
+        ends,
+        weights: [0, 1, 2].map(|i| {
+            let [p, q] = [corners[(i + 1) % 3], corners[(i + 2) % 3]];
+            twice_area(p, q, at) / twice_area(a, b, c)
+        }),
+    };
+    region.on_circles(first.material, &around).into_iter().map(point).collect()
 }
 
 impl ObservedProblem {
