@@ -4,7 +4,10 @@ use super::Measured;
 use crate::{
     advice::missed_mean,
     evolution::{AIM, Outcome},
-    observe::{Bar, Dimension, Figure, NEGLIGIBLE_DAMAGE, Observation, ObservedProblem, Of, Value},
+    observe::{
+        Bar, Dimension, FIRST_CONTACT, Figure, NEGLIGIBLE_DAMAGE, Observation, ObservedProblem, Of,
+        Value,
+    },
     petsc::PetscError,
     problem::{SAMPLE_TIMES, State},
 };
@@ -52,6 +55,13 @@ impl Outcome {
         let last = (&self.last.state, &self.last.figures[..]);
         problem.add_step_errors(&mut self.bars, &now, last, of_steps)?;
         problem.join_bars(&mut self.bars, &self.last.figures);
+        for (name, first) in problem.foundations.iter().zip(&self.last.first_contact) {
+            for (kind, [_, error]) in FIRST_CONTACT.iter().zip(first.found.iter().flatten()) {
+                let name = format!("{name}.{kind}");
+                let bar = self.bars.iter_mut().find(|bar| bar.name == name);
+                bar.into_iter().for_each(|bar| bar.bar += error);
+            }
+        }
         Ok(())
     }
 
@@ -172,7 +182,8 @@ impl ObservedProblem {
                 Dimension::Zeta | Dimension::OfZeta => NEGLIGIBLE_DAMAGE,
                 Dimension::Stress => MIN_PART * mean_stress,
                 // A sum of lengths of edges has no rounding.
-                Dimension::ContactLength | Dimension::Place | Dimension::Given => 0.0,
+                Dimension::ContactLength | Dimension::Time => 0.0,
+                Dimension::Place | Dimension::Given => 0.0,
             };
             own.max(least)
         };

@@ -156,7 +156,7 @@ impl<'a> Extremes<'a> {
         let next: HashSet<usize> = next.flatten().copied().collect();
         let unknown = rays.iter().filter(|of| of.stresses.is_none());
         let unknown = Vec::from_iter(unknown.map(|of| of.near(self.problem)));
-        let points = nodal.points.iter().enumerate().filter(|(i, of)| {
+        let points = nodal.all().enumerate().filter(|(i, of)| {
             of.ends.iter().any(|end| next.contains(end)) || unknown.iter().any(|near| near[*i])
         });
         let places = Vec::from_iter(points.map(|(_, point)| point.at));
@@ -255,9 +255,9 @@ impl<'a> Extremes<'a> {
     pub(super) fn named(&self, points: &[Singular]) -> Vec<Extreme> {
         let points = points.iter().filter(|of| !of.is_open || !self.presses(of.at)).cloned();
         let extremes = self.all.iter().zip(self.near(&Vec::from_iter(points)));
-        let named = |(extreme, singular): (&Extreme, Option<String>)| Extreme {
-            singular: extreme.singular.clone().or(singular),
-            ..extreme.clone()
+        let named = |(extreme, near): (&Extreme, Option<String>)| {
+            let near = near.filter(|_| !self.problem.figures[extreme.number].is_away());
+            Extreme { singular: extreme.singular.clone().or(near), ..extreme.clone() }
         };
         extremes.map(named).collect()
     }

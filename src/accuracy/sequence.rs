@@ -67,6 +67,11 @@ impl<'a> Sequence<'a> {
         before.iter().any(|other| other.error >= 2.0 * answer.error)
     }
 
+    /// The answer whose bars these are.
+    pub(super) fn answer(&self) -> &Answer {
+        self.answers[self.answer]
+    }
+
     /// r.
     pub(super) fn rate(&self) -> f64 {
         self.rate
@@ -92,7 +97,15 @@ impl<'a> Sequence<'a> {
 
     /// The bar of the figure `i`, which may be a stress.
     pub(super) fn error(&self, i: usize, is_stress: bool) -> f64 {
-        self.bar(SAFETY[usize::from(is_stress)], |a, b| (a.values[i] - b.values[i]).abs())
+        self.bar(SAFETY[usize::from(is_stress)], |a, b| {
+            let [a, b] = [a, b].map(|of| of.values[i]);
+            match a.is_nan() || b.is_nan() {
+                false => (a - b).abs(),
+                // A first contact is missing on both meshes, or on one of them.
+                true if a.is_nan() == b.is_nan() => 0.0,
+                true => f64::INFINITY,
+            }
+        })
     }
 
     /// The bar of the figure `i`, a length of contact. A change within the open parts is no error beyond them.

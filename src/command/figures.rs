@@ -73,7 +73,9 @@ impl<'a> LastFigures<'a> {
                 label: &figure.label,
                 unit: figure.dimension.unit(units),
                 value: last.figures[i].value,
-                bar: bar.filter(|_| extreme.is_none_or(Extreme::is_known)),
+                bar: bar.filter(|_| {
+                    extreme.is_none_or(Extreme::is_known) && !last.figures[i].value.is_nan()
+                }),
                 at: last.figures[i].at,
                 singular: extreme.and_then(|of| of.singular.clone()),
                 unresolved: extreme.and_then(|of| of.unresolved.clone()),

@@ -175,6 +175,9 @@ fn displacement(task: &Task, figures: &LastFigures) -> String {
     }
 }
 
+/// The region of the figures `…_away`.
+const AWAY: &str = "away from singular points";
+
 /// The lines of the extreme stresses of the body, and a line for each of several materials.
 fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
     if figures.value("von_mises_max") == 0.0 {
@@ -186,20 +189,36 @@ fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
         Some(place) => format!(" at {place}, grows as the mesh is refined"),
         None => String::new(),
     };
+    // A line of all extremes of a part, or of the body; `away` from singular points, if there are such figures.
+    let line = |part: &str, words: &str, away: &str| {
+        let kinds = ["von_mises_max", "principal_max", "principal_min"];
+        let names = kinds.map(|kind| format!("{part}{kind}{away}"));
+        figures.get(&names[0])?;
+        let [von_mises, most, least] = names.map(|name| figures.full_text(&name));
+        Some(row("", format!("{words}: von Mises {von_mises}, σ₁ {most}, σ₂ {least}")))
+    };
     let of_material = |name: &str| {
-        let [von_mises, most, least] = ["von_mises_max", "principal_max", "principal_min"]
-            .map(|kind| figures.full_text(&format!("{name}.{kind}")));
-        row("", format!("{}: von Mises {von_mises}, σ₁ {most}, σ₂ {least}", in_words(name)))
+        let (part, words) = (format!("{name}."), in_words(name));
+        let of_rest = format!("{words}, {AWAY}");
+        [line(&part, words, ""), line(&part, &of_rest, "_away")].into_iter().flatten()
     };
     let materials = task.problem.materials();
     let several = materials.clone().count() > 1;
+    let away = line("", AWAY, "_away").or_else(|| {
+        let length = task.problem.proposed_distance().filter(|_| !grows.is_empty())?;
+        let (length, unit) = (plain(length, 1), &task.problem.scene().units.length);
+        let what =
+            format!("`away = {length}` adds the extremes at least {length} {unit} away from");
+        Some(row("", format!("{what} singular points")))
+    });
     [
         row("stress", format!("largest von Mises {von_mises}{grows}")),
         row("", format!("largest σ₁ {most}")),
         row("", format!("smallest σ₂ {least}")),
     ]
     .into_iter()
-    .chain(materials.filter(|_| several).map(of_material))
+    .chain(away)
+    .chain(materials.filter(|_| several).flat_map(of_material))
     .collect()
 }
 
@@ -226,8 +245,17 @@ fn contact(task: &Task, last: StepRecord, figures: &LastFigures) -> Vec<String> 
         row("", format!("{name}length {}{largest}", figures.full_text(&length)))
     };
     let all = [None].into_iter().chain(several.iter().map(Some)).map(of);
+    let first_contact = |name: &String| {
+        let [time, x, y] = ["first_contact", "load_x_at_first_contact", "load_y_at_first_contact"]
+            .map(|kind| format!("{name}.{kind}"));
+        figures.value(&time).is_finite().then(|| {
+            let [time, x, y] = [figures.full_text(&time), figures.text(&x), figures.full_text(&y)];
+            row("", format!("{name}: first contact at t = {time}, under loads of ({x}, {y})"))
+        })
+    };
     let first = row("contact", format!("{active} of {nodes} nodes active, force {force}"));
-    [first].into_iter().filter(|_| nodes > 0).chain(all).collect()
+    let first_contacts = foundations.iter().filter_map(first_contact);
+    [first].into_iter().filter(|_| nodes > 0).chain(all).chain(first_contacts).collect()
 }
 
 /// The line of a support with its resultants.

@@ -37,8 +37,8 @@ use certificate::active_bounds;
 pub use solver_error::Accuracy;
 
 use super::{
-    DiscreteProblem, LoadCase, ObservedProblem, RunError, RunOptions, State, Step, StepFailure,
-    StepRecord, agreed, extrapolation::Extrapolation,
+    DiscreteProblem, FirstContact, LoadCase, ObservedProblem, RunError, RunOptions, State, Step,
+    StepFailure, StepRecord, agreed, extrapolation::Extrapolation,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
@@ -252,6 +252,7 @@ impl<'a> ContactStep<'a> {
             return Err(RunError::Step { step, time, source });
         }
         Ok(Step {
+            first_contact: FirstContact::of(&observation, time),
             strains: observation.strained.strains,
             state,
             record,

@@ -86,7 +86,7 @@ impl Outcome {
     /// The outcome of a run after its first solve, (27).
     pub(super) fn new(first: Step, problem: &ObservedProblem) -> Self {
         let mut outcome = Self { last: first, ..Self::default() };
-        outcome.last.govern(problem, &[]);
+        outcome.last.govern(problem, None);
         outcome.count_last();
         outcome
     }
@@ -105,7 +105,7 @@ impl Outcome {
     }
 
     pub(super) fn accept(&mut self, mut step: Step, problem: &ObservedProblem) {
-        step.govern(problem, &self.last.governing);
+        step.govern(problem, Some(&self.last));
         let before = Rc::new(mem::replace(&mut self.last, step));
         let keep_larger = |kept: &mut Option<Rc<Step>>, of: fn(&StepRecord) -> f64| {
             if kept.as_ref().is_none_or(|kept| of(&before.record) > of(&kept.record)) {

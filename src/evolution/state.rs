@@ -1,6 +1,6 @@
 //! A step: its fields and its figures.
 
-use super::{ObservedProblem, State};
+use super::{FirstContact, ObservedProblem, State};
 use crate::{
     contact::{ContactReport, Kkt},
     fem::{DamageCertificate, RigidMotion},
@@ -22,6 +22,8 @@ pub struct Step {
     pub governing: Vec<Option<GoverningValue>>,
     /// The maximum Σ|·| of the loads and the internal forces so far, N per metre of thickness: the scale of resultants.
     pub forces: f64,
+    /// Per foundation: its first contact.
+    pub first_contact: Vec<FirstContact>,
     /// The effort of the contact solve; not in archives.
     #[serde(skip)]
     pub report: ContactReport,
@@ -95,10 +97,11 @@ pub struct StepRecord {
 }
 
 impl Step {
-    /// Sets the governing values from those of the step before; empty for the first one.
-    pub(super) fn govern(&mut self, problem: &ObservedProblem, before: &[Option<GoverningValue>]) {
+    /// Sets the figures and the governing values that follow from the step before; `None` for the first one. Collective.
+    pub(super) fn govern(&mut self, problem: &ObservedProblem, before: Option<&Self>) {
+        self.set_first_contact(problem, before);
         let governing = |(i, (figure, of)): (usize, (&Figure, &Value))| {
-            let (before, time) = (before.get(i).copied().flatten(), self.record.time);
+            let (before, time) = (before.and_then(|of| of.governing[i]), self.record.time);
             let own = GoverningValue { value: of.value, at: of.at, time };
             if figure.governs(of.value, before.map(|of| of.value)) { Some(own) } else { before }
         };

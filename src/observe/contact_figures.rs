@@ -10,6 +10,8 @@ pub(crate) struct ContactFigures {
     /// stretch without contact), the one with the largest pressure, and the point of the resultant's line of action that is
     /// nearest to the middle between the first and the last one. NaN without contact.
     pub places: [f64; 8],
+    /// The least remaining gap, m; 0 with contact.
+    pub opening: f64,
 }
 
 impl ObservedProblem {
@@ -32,6 +34,10 @@ impl ObservedProblem {
                 Value { value: pressure, at: peak.map(place) },
                 self.supports.contact.length(rows).0.into(),
             ],
+            opening: match first {
+                Some(_) => 0.0,
+                None => rows.iter().map(|row| row.gap).fold(f64::INFINITY, f64::min).max(0.0),
+            },
             places: std::array::from_fn(|k| places[k / 2][k % 2]),
         }
     }

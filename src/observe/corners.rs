@@ -18,7 +18,7 @@ use std::sync::OnceLock;
 #[derive(Debug)]
 pub(super) struct LoadedCorner {
     corner: Corner,
-    /// Per point of this rank: does its stress come from fits in the triangles at the corner or next to them?
+    /// Per point of this rank, of both lists of [`NodalStress`]: does its stress come from fits in the triangles at the corner or next to them?
     near: OnceLock<Vec<bool>>,
 }
 
@@ -136,7 +136,7 @@ impl Rays<'_> {
             let bits = |at: [f64; 2]| at.map(f64::to_bits);
             let places: HashSet<_> = vertices.into_iter().map(|v| bits(mesh.nodes[v])).collect();
             let is_near = |point| nodal.ends_of(point).iter().any(|&at| places.contains(&bits(at)));
-            nodal.points.iter().map(is_near).collect()
+            nodal.all().map(is_near).collect()
         })
     }
 }

@@ -8,6 +8,7 @@
 //! What crosses the door: `evolution` observes each step, and `output` writes fields and rows of contact. Nothing here changes a
 //! state. [`Supports`] divide the reaction at a node between boundaries.
 
+mod away;
 mod contact_figures;
 mod contact_line;
 mod corners;
@@ -22,7 +23,7 @@ pub use contact_line::{ContactLine, ContactRow};
 pub use corners::Rays;
 pub(crate) use corners::{Known, sizes};
 pub use figures::{Bar, Dimension, Figure, Figures, Of, Value, in_words};
-pub(crate) use figures::{NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
+pub(crate) use figures::{FIRST_CONTACT, NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
 pub use nodal_stress::{NodalStress, Strained, principal, principal_direction};
 pub use supports::Supports;
 
@@ -33,6 +34,7 @@ use crate::{
     problem::{DiscreteProblem, SetupError},
     scene::Scene,
 };
+use away::Region;
 use corners::LoadedCorner;
 use mean_displacement::Means;
 use probe::Probes;
@@ -51,6 +53,8 @@ pub struct ObservedProblem {
     means: Means,
     /// Everything that a run prints.
     pub figures: Figures,
+    /// Where the figures `…_away` are taken.
+    away: Region,
     nodal_stress: OnceLock<Arc<NodalStress>>,
     /// The corners at which stresses may depend on the direction.
     corners: OnceLock<Vec<LoadedCorner>>,
@@ -65,10 +69,12 @@ impl ObservedProblem {
         let problem = DiscreteProblem::new(scene, mesh)?;
         let lines = Lines::boundary(&problem.body.mesh);
         let supports = Supports::new(&problem, &lines);
+        let away = Region::new(&problem)?;
         Ok(Self {
             probes: Probes::new(problem.scene(), &problem.body)?,
             means: Means::new(problem.scene(), &problem.body, &lines),
-            figures: Figures::of(&problem, &supports),
+            figures: Figures::of(&problem, &supports, &away),
+            away,
             nodal_stress: OnceLock::new(),
             corners: OnceLock::new(),
             supports,

@@ -27,6 +27,15 @@ const LARGEST: f64 = 1e100;
 /// A condition on finite values: its text in messages, and the test.
 type Rule<'a> = (&'a str, &'a dyn Fn(f64) -> bool);
 
+/// Is the accuracy required for the figure or norm `name`, if the scene names these figures, or none? A first contact is as exact as
+/// the steps before it are short, and must be named.
+pub(crate) fn is_required(names: &[String], name: &str) -> bool {
+    match names {
+        [] => !name.ends_with("first_contact"),
+        names => names.iter().any(|known| known == name),
+    }
+}
+
 impl Scene {
     /// Checks the scene against its mesh:
     /// - every material of a surface names a physical surface;
@@ -74,9 +83,27 @@ impl Scene {
         self.text.refuse(outside.iter().map(problem).collect())
     }
 
+    /// Reports the numbers of materials without a node as far from singular points as their `away`.
+    ///
+    /// # Errors
+    /// These materials, with their lines.
+    pub fn check_distances(&self, empty: &[usize]) -> Result<(), SceneError> {
+        let problem = |number: &usize| {
+            let name = number.checked_sub(1).and_then(|i| self.surfaces.keys().nth(i));
+            let [of, key] = match name {
+                Some(name) => [name.clone(), format!("material.{name}.away")],
+                None => ["the material".to_owned(), "away".to_owned()],
+            };
+            let known = self.text.positions.contains_key(&key);
+            let key: &str = if known { &key } else { "away" };
+            self.at_key(key, &format!("leaves no node of {of}; set a smaller length"))
+        };
+        self.text.refuse(empty.iter().map(problem).collect())
+    }
+
     /// Is the accuracy required for the figure or norm `name`?
     pub fn requires_accuracy_of(&self, name: &str) -> bool {
-        self.accuracy_of.is_empty() || self.accuracy_of.iter().any(|known| known == name)
+        is_required(&self.accuracy_of, name)
     }
 
     /// Checks that the figures in `accuracy_of` are among the `known` ones.

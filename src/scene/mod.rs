@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 
 pub use as_run::AsRun;
 pub use boundary::{Boundary, Condition, Gap, SurfaceLoad};
+pub(crate) use check::is_required;
 pub use error::SceneError;
 pub use expression::{Expression, ExpressionError};
 pub use schema::SCHEMA;
@@ -66,6 +67,8 @@ pub struct Scene {
     pub accuracy: Option<f64>,
     /// The figures that must have the accuracy; if empty, all figures, u and the damage.
     pub accuracy_of: Vec<String>,
+    /// The distance from singular points beyond which extreme stresses are figures of their own, m.
+    pub away: Option<f64>,
     /// The memory, MB, and the time, s, that a run with an accuracy may take.
     pub max_memory: Option<f64>,
     /// See `max_memory`.
@@ -125,6 +128,8 @@ pub struct Surface {
     pub material: Material,
     /// Its damage law, if there is damage. All surfaces have the same ζ_*.
     pub law: Option<DamageLaw>,
+    /// Its [`Scene::away`], m.
+    pub away: Option<f64>,
 }
 
 /// Whether `zeta` is an admissible ζ₀: in (ζ_*, 1].
@@ -159,6 +164,11 @@ impl Scene {
     /// The materials by their numbers: the material of the scene, then those of the surfaces.
     pub fn materials(&self) -> impl Iterator<Item = Material> {
         iter::once(self.material).chain(self.surfaces.values().map(|surface| surface.material))
+    }
+
+    /// Per material: the distance from singular points beyond which extreme stresses are figures of their own, m.
+    pub fn distances_of_extremes(&self) -> Vec<Option<f64>> {
+        iter::once(self.away).chain(self.surfaces.values().map(|surface| surface.away)).collect()
     }
 
     /// The damage laws of these materials; empty without damage.

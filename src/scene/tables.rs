@@ -31,6 +31,7 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let damage = found.build("damage", damage);
     let accuracy: Option<f64> = found.build("accuracy", Ok);
     let accuracy_of: Option<Vec<String>> = found.build("accuracy_of", Ok);
+    let away: Option<f64> = found.build("away", Ok);
     let [max_memory, max_seconds] = ["max_memory", "max_seconds"].map(|key| found.build(key, Ok));
     let degree: Option<f64> = found.build("discretisation.displacement", Ok);
     let time = found.build("time", time);
@@ -41,21 +42,24 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
     let units = found.build("units", units);
     let boundaries = found.build_all("boundary", boundary);
     let probes = found.build_all("probe", |of| probe(of, &boundaries));
-    let materials: Vec<(String, Material)> = found.build("material", surfaces).unwrap_or_default();
+    let materials: Vec<(String, OfSurface)> = found.build("material", surfaces).unwrap_or_default();
     let laws = found.build("damage", surfaces).unwrap_or_default();
 
     let material: Material = material?;
     check_times(found, output.as_ref(), time, accuracy.is_some());
-    let weightless = material.density == 0.0 && materials.iter().all(|(_, of)| of.density == 0.0);
+    let weightless =
+        material.density == 0.0 && materials.iter().all(|(_, of)| of.material.density == 0.0);
     let pulls = gravity.iter().flatten().any(|g| g.as_constant() != Some(0.0));
     if weightless && pulls {
         found.note("body.gravity", "has no effect without a density; set material.density");
     }
     let law = damage.as_ref().map(|damage| damage.law);
-    let mut surfaces: BTreeMap<String, Surface> =
-        materials.into_iter().map(|(name, material)| (name, Surface { material, law })).collect();
+    let surface = |(name, of): (String, OfSurface)| {
+        (name, Surface { material: of.material, law, away: of.away.or(away) })
+    };
+    let mut surfaces: BTreeMap<String, Surface> = materials.into_iter().map(surface).collect();
     for (name, law) in laws {
-        surfaces.entry(name).or_insert(Surface { material, law: None }).law = Some(law);
+        surfaces.entry(name).or_insert(Surface { material, law: None, away }).law = Some(law);
     }
     let degree = degree.unwrap_or(if accuracy.is_some() { 2.0 } else { 1.0 });
     Some(Scene {
@@ -69,6 +73,7 @@ pub(super) fn scene(found: &mut Diagnostics) -> Option<Scene> {
         order: if degree == 2.0 { Order::Quadratic } else { Order::Linear },
         accuracy,
         accuracy_of: accuracy_of.unwrap_or_default(),
+        away,
         max_memory,
         max_seconds,
         time,
@@ -101,6 +106,14 @@ fn check_times(
     if let Some(text) = output.and_then(|output| output.times.iter().find_map(missed)) {
         found.note("output.times", text);
     }
+}
+
+/// The table `[material.NAME]`.
+#[derive(Deserialize)]
+struct OfSurface {
+    #[serde(flatten)]
+    material: Material,
+    away: Option<f64>,
 }
 
 /// The tables of the surfaces in a table, by name. The surrounding table completes each of them.

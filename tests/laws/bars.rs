@@ -1,6 +1,6 @@
 //! Error bars: a figure is off by no more than its bar, and the bar is no idle one.
 
-use crate::support::{adapted, scene, solved, square};
+use crate::support::{adapted, layered, scene, solved, square};
 use signorini::{
     accuracy::{self, Adapted},
     evolution::{ObservedProblem, Outcome, RunOptions},
@@ -234,7 +234,9 @@ fn a_foundation_that_comes_from_far_away_leaves_the_bars_as_they_are() {
         let travel = crate::support::figures(&problem, &outcome.last)["bottom.travel"];
         assert!((travel - far - 0.01).abs() < 1e-12, "{travel}");
         assert!(outcome.bars.iter().all(|bar| bar.name != "bottom.travel"));
-        outcome.bars.iter().map(|bar| (bar.name.clone(), bar.relative())).collect::<Vec<_>>()
+        // Only the foundation that is far away has a first contact.
+        let bars = outcome.bars.iter().filter(|bar| !bar.name.ends_with("first_contact"));
+        bars.map(|bar| (bar.name.clone(), bar.relative())).collect::<Vec<_>>()
     });
     for ((name, near), (_, far)) in bars[0].iter().zip(&bars[1]) {
         assert!((near - far).abs() <= 1e-6 * near.max(1e-9), "{name}: {near}, {far}");
@@ -271,5 +273,76 @@ fn the_error_of_u_is_measured_where_an_estimate_sees_too_little_of_it() {
         );
         assert!(error <= accuracy, "{error} beyond {accuracy}");
         assert!((measured / error - 1.0).abs() < 0.08, "{measured} for {error}");
+    }
+}
+
+/// A column, E = 100, hangs from its top. A load t² pulls it down by t²/E onto a foundation at 0.003: there at t = √0.3.
+#[test]
+fn a_first_contact_is_off_by_no_more_than_its_bar_which_is_within_its_step() {
+    let scene_of = |gap: f64, steps: f64| {
+        scene(&format!(
+            "time = {{ end = 1, step = {} }}
+             material = {{ young = 100, poisson = 0, plane = 'stress' }}
+             boundary = [
+                {{ name = 'top', displacement = ['free', 0] }},
+                {{ name = 'left', symmetry = true }},
+                {{ name = 'bottom', gap = {gap}, traction = [0, '-t^2'] }},
+             ]",
+            1.0 / steps
+        ))
+    };
+    for steps in [4.0, 10.0, 23.0] {
+        let (problem, outcome) = with_bars(&scene_of(0.003, steps), 3);
+        let exact = [
+            ("bottom.first_contact", 0.3_f64.sqrt()),
+            ("bottom.load_x_at_first_contact", 0.0),
+            ("bottom.load_y_at_first_contact", -0.3),
+        ];
+        for (name, exact) in exact {
+            let value = outcome.last.figures[problem.figures.number(name).unwrap()].value;
+            let (error, bar) = ((value - exact).abs(), bar(&outcome.bars, name));
+            println!("{steps}: {name} = {value} ± {bar} for {exact}");
+            assert!(error <= bar && bar < 1.01 / steps, "{steps}, {name}: {value} ± {bar}");
+        }
+    }
+    // It stays open, or touches from the start.
+    let (problem, outcome) = with_bars(&scene_of(0.02, 10.0), 3);
+    let number = problem.figures.number("bottom.first_contact").unwrap();
+    assert!(outcome.last.figures[number].value.is_nan());
+    let closed = ObservedProblem::new(scene_of(0.0, 10.0), square(3)).unwrap();
+    assert_eq!(closed.figures.number("bottom.first_contact"), None);
+}
+
+/// In the upper half λ_U is five times as large, and the damage hardly spreads: ζ = 1 − c t and 1 − 5c t. The consistent mass overshoots
+/// at the jump between them, on every mesh alike.
+#[test]
+fn the_bar_of_the_least_zeta_contains_the_overshoot_at_a_jump() {
+    for order in [1, 2] {
+        let scene = scene(&format!(
+            "discretisation.displacement = {order}
+             time = {{ end = 1, step = 0.05 }}
+             material = {{ young = 1, poisson = 0, plane = 'stress' }}
+             damage = {{ diffusion = 1e-9, lambda_d = 0, lambda_u = 400, upper.lambda_u = 2000 }}
+             boundary = [
+                {{ name = 'left', symmetry = true }},
+                {{ name = 'bottom', symmetry = true }},
+                {{ name = 'right', displacement = [0.01, 'free'] }},
+             ]"
+        ));
+        let exact = 1.0 - 0.5 * 2000.0 * 0.01 * 0.01;
+        for n in [4, 8, 16] {
+            let mesh = layered(square(n));
+            let problem = ObservedProblem::new(scene.clone(), mesh.clone()).unwrap();
+            let mut outcome = solved(scene.clone(), mesh.clone());
+            let session = Session::start(&[]).unwrap();
+            let options = RunOptions::of(&scene);
+            let measured =
+                accuracy::measured_errors(&session, &scene, &mesh, &options, None).unwrap();
+            outcome.set_bars(&problem, &measured).expect("PETSc works");
+            let (zeta, bar) = (outcome.last.record.zeta_min, bar(&outcome.bars, "zeta_min"));
+            println!("P{order}, {n}: {zeta} ± {bar} for {exact}");
+            assert!((zeta - exact).abs() > 1e-3, "no overshoot");
+            assert!((zeta - exact).abs() <= bar, "P{order}, {n}: {zeta} ± {bar} for {exact}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use crate::support::{adapted, order, run, scene, square, with_part};
 use signorini::{
     contact::SOLVERS,
     evolution::ObservedProblem,
+    observe::Value,
     scene::{Expression, Scene},
 };
 use std::f64::consts::PI;
@@ -12,6 +13,8 @@ use std::f64::consts::PI;
 const WIDTH: f64 = 0.5;
 const YOUNG: f64 = 1000.0;
 const POISSON: f64 = 0.3;
+/// No node lies at this distance from the tip, m.
+const AWAY: f64 = 0.13;
 
 /// Stresses and displacements of the half-plane y > 0 that a frictionless punch |x| < a presses with
 /// p = 1/√(1 − (x/a)²), as expressions (Westergaard; plane stress). With z = (x + iy)/a,
@@ -74,6 +77,7 @@ impl HalfPlane {
         let [xx, yy, xy] = &self.stress;
         scene(&format!(
             "discretisation.displacement = 2
+             away = {AWAY}
              material = {{ young = {YOUNG}, poisson = {POISSON}, plane = 'stress' }}
              boundary = [
                 {{ name = 'left', symmetry = true }},
@@ -114,4 +118,47 @@ fn the_pressure_under_a_punch_comes_at_the_rate_of_smooth_solutions() {
     // On uniform meshes u ~ r^½ leaves N^−¼.
     let rates = [&strains, &pressures].map(|errors| -order(&unknowns, errors));
     assert!(rates.iter().all(|rate| (0.9..1.2).contains(rate)), "N to the minus {rates:?}");
+}
+
+/// The extremes away from the tip lie on the circle around it, between the nodes. Their error falls with the triangles, as the
+/// stress on the circle is smooth.
+#[test]
+fn extremes_away_from_a_singular_point_converge() {
+    let exact = HalfPlane::new();
+    let [xx, yy, xy] = exact.stress.each_ref().map(|text| Expression::parse(text).unwrap());
+    let von_mises = |[x, y]: [f64; 2]| {
+        let [xx, yy, xy] = [&xx, &yy, &xy].map(|stress| stress.eval(x, y, 0.0));
+        (xx * xx - xx * yy + yy * yy + 3.0 * xy * xy).sqrt()
+    };
+    let part = |i: usize| i as f64 / 1000.0;
+    let circle = (1..1000).map(|i| {
+        let (sine, cosine) = (PI * part(i)).sin_cos();
+        [WIDTH + AWAY * cosine, AWAY * sine]
+    });
+    let bottom = (0..=1000).map(|i| [part(i), 1e-9]).filter(|[x, _]| (x - WIDTH).abs() >= AWAY);
+    let largest = circle.chain(bottom).map(von_mises).fold(0.0, f64::max);
+    let (sizes, mut errors) = ([8.0, 16.0, 32.0], Vec::new());
+    for n in sizes {
+        let mesh = with_part(square(n as usize), "bottom", "punch", |[x, _]| x <= WIDTH);
+        let problem = ObservedProblem::new(exact.scene(), mesh).unwrap();
+        let last = run(&problem, SOLVERS[0]).last;
+        let number = problem.figures.number("von_mises_max_away").unwrap();
+        let Value { value, at } = last.figures[number];
+        let [x, y] = at.unwrap();
+        println!("{n}: {value} for {largest} at ({x}, {y})");
+        assert!((x - WIDTH).hypot(y) > 0.999 * AWAY, "({x}, {y}) is too near to the tip");
+        errors.push((value / largest - 1.0).abs());
+    }
+    let rate = -order(&sizes, &errors);
+    assert!(errors[2] < 0.01 && rate > 0.8, "{errors:?} fall like h^{rate}");
+}
+
+/// A length that leaves nothing of the body is refused.
+#[test]
+fn a_length_away_that_leaves_nothing_is_refused() {
+    let mut scene = HalfPlane::new().scene();
+    scene.away = Some(2.0);
+    let mesh = with_part(square(4), "bottom", "punch", |[x, _]| x <= WIDTH);
+    let refused = ObservedProblem::new(scene, mesh).unwrap_err().to_string();
+    assert!(refused.contains("away leaves no node of the material"), "{refused}");
 }

@@ -11,8 +11,11 @@ pub(crate) use observation::{Observation, greatest};
 pub use scales::Bar;
 pub(crate) use scales::{NEGLIGIBLE_DAMAGE, SHOWN_AS_ZERO};
 
-use super::Supports;
-use crate::{problem::DiscreteProblem, scene::Units};
+use super::{Supports, away::Region};
+use crate::{
+    problem::DiscreteProblem,
+    scene::{Boundary, Gap, Units},
+};
 use serde::{Deserialize, Serialize};
 use std::{fmt, iter, ops::Index, slice};
 
@@ -35,6 +38,8 @@ pub enum Dimension {
     Stress,
     /// m, along Γ_C.
     ContactLength,
+    /// s.
+    Time,
     /// A coordinate of a place, m. It has no error bar and no extreme in a run.
     Place,
     /// A length that the scene gives, m. It has no error.
@@ -49,6 +54,7 @@ impl Dimension {
             Self::Length | Self::ContactLength | Self::Place | Self::Given => units.length.clone(),
             Self::Force => format!("{}/{}", units.force, units.length),
             Self::Moment => units.force.clone(),
+            Self::Time => units.time.clone(),
             Self::Zeta | Self::OfZeta => String::new(),
             Self::Stress => units.stress.clone(),
         }
@@ -131,6 +137,11 @@ impl Figure {
         self.dimension == Dimension::Stress && self.governing != Governing::LargestModulus
     }
 
+    /// Is it an extreme over places away from singular points?
+    pub fn is_away(&self) -> bool {
+        self.kind.ends_with("_away")
+    }
+
     /// Is it an extreme of the contact pressure?
     pub fn is_pressure(&self) -> bool {
         self.kind == "pressure_max"
@@ -144,7 +155,10 @@ impl Figure {
     /// Is `value` more extreme than `other`, the extreme of the steps before? Before the first step `other` is `None`. Places have
     /// no extremes.
     pub fn governs(&self, value: f64, other: Option<f64>) -> bool {
-        let Some(other) = other else { return self.dimension != Dimension::Place };
+        // A first contact has no value before.
+        let Some(other) = other.filter(|of| !of.is_nan()) else {
+            return self.dimension != Dimension::Place;
+        };
         match self.governing {
             Governing::Largest => value > other,
             Governing::Least => value < other,
@@ -161,7 +175,13 @@ struct PartOfBoundary<'a> {
     foundation: Option<usize>,
     /// Does its foundation move?
     moves: bool,
+    /// Is the undeformed body apart from its foundation at the start?
+    is_open: bool,
 }
+
+/// The kinds of the figures of a first contact: its time, and the components of the resultant of all loads then.
+pub(crate) const FIRST_CONTACT: [&str; 3] =
+    ["first_contact", "load_x_at_first_contact", "load_y_at_first_contact"];
 
 /// The figures of a problem.
 #[derive(Debug, Default)]
@@ -181,26 +201,44 @@ pub fn in_words(material: &str) -> &str {
 }
 
 impl Figures {
-    /// The list of all figures of a problem with these supports.
-    pub(super) fn of(problem: &DiscreteProblem, supports: &Supports) -> Self {
+    /// The list of all figures of a problem with these supports and this region `away` from singular points.
+    pub(super) fn of(problem: &DiscreteProblem, supports: &Supports, away: &Region) -> Self {
         let several = if problem.materials.len() > 1 { &problem.materials[..] } else { &[] };
         let number = |names: &[String], of: &str| names.iter().position(|name| name == of);
+        let opens = |gap: &Gap, of: &Boundary| {
+            let mut places = problem.mesh().edges_of(&of.name).iter().flatten();
+            places.all(|&node| {
+                let [x, y] = problem.mesh().nodes[node];
+                gap.distance.eval(x, y, 0.0) > 0.0
+            })
+        };
         let boundaries = problem.scene().boundaries.iter().map(|of| PartOfBoundary {
             name: &of.name,
             support: number(&supports.names, &of.name),
             foundation: number(&problem.foundations, &of.name),
             moves: of.gap().is_some_and(|gap| gap.distance.depends_on_time()),
+            is_open: problem.scene().time.is_some() && of.gap().is_some_and(|gap| opens(gap, of)),
         });
         let materials = several.iter().map(|(_, name)| name.as_str());
         let probes = problem.scene().probes.iter().map(|probe| probe.name.as_str());
-        Self::new(&Vec::from_iter(materials), &Vec::from_iter(boundaries), &Vec::from_iter(probes))
+        let parts = several.iter().map(|(number, _)| away.has(number));
+        let has_away = iter::once(away.exists()).chain(parts);
+        Self::new(
+            (&Vec::from_iter(materials), &Vec::from_iter(has_away)),
+            &Vec::from_iter(boundaries),
+            &Vec::from_iter(probes),
+        )
     }
 
     /// The list of all figures: of the body, of these `materials` if there are several, of the `boundaries` with a table and of the
-    /// `probes`.
-    fn new(materials: &[&str], boundaries: &[PartOfBoundary], probes: &[&str]) -> Self {
+    /// `probes`. The body and each material may have extremes away from singular points.
+    fn new(
+        (materials, has_away): (&[&str], &[bool]),
+        boundaries: &[PartOfBoundary],
+        probes: &[&str],
+    ) -> Self {
         use Dimension::{
-            ContactLength, Force, Given, Length, Moment, OfZeta, Place, Stress, Work, Zeta,
+            ContactLength, Force, Given, Length, Moment, OfZeta, Place, Stress, Time, Work, Zeta,
         };
         use Governing::{Largest, LargestModulus, Least};
         let (mut all, body) = (Self::default(), Of::Body);
@@ -215,9 +253,23 @@ impl Figures {
             ("principal_max", "largest σ₁@", Stress, Largest),
             ("principal_min", "smallest σ₂@", Stress, Least),
         ];
-        let materials = materials.iter().map(|name| Of::Material((*name).to_owned()));
-        for (i, of) in iter::once(Of::Body).chain(materials).enumerate() {
+        let away = [
+            (
+                "von_mises_max_away",
+                "largest von Mises stress@ away from singular points",
+                Stress,
+                Largest,
+            ),
+            ("principal_max_away", "largest σ₁@ away from singular points", Stress, Largest),
+            ("principal_min_away", "smallest σ₂@ away from singular points", Stress, Least),
+        ];
+        let parts = iter::once(Of::Body)
+            .chain(materials.iter().map(|name| Of::Material((*name).to_owned())));
+        for (i, of) in parts.enumerate() {
             all.add(&of, stresses, move |of, k| of.stresses[i][k]);
+            if has_away[i] {
+                all.add(&of, away, move |of, k| of.away[i][k]);
+            }
         }
         let contact = [
             ("pressure_max", "largest contact pressure@", Stress, Largest),
@@ -249,6 +301,16 @@ impl Figures {
             if boundary.moves {
                 let travel = ("travel", "travel of the foundation@", Given, LargestModulus);
                 all.add(&of, [travel], move |of, _| of.means[i][2].into());
+            }
+            if boundary.is_open {
+                let [time, x, y] = FIRST_CONTACT;
+                let first = [
+                    (time, "time of first contact@", Time, LargestModulus),
+                    (x, "loads at first contact@, x", Force, LargestModulus),
+                    (y, "loads at first contact@, y", Force, LargestModulus),
+                ];
+                // The steps set them.
+                all.add(&of, first, |_, _| f64::NAN.into());
             }
             if let Some(foundation) = boundary.foundation {
                 all.add(&of, contact, move |of, k| of.contact[1 + foundation].values[k]);
@@ -286,8 +348,9 @@ impl Figures {
     /// The figures that a scene may have, with general names of its parts.
     pub fn of_any_scene() -> Self {
         let [support, foundation] = [Some(0); 2];
-        let boundary = PartOfBoundary { name: "BOUNDARY", support, foundation, moves: true };
-        Self::new(&["MATERIAL"], &[boundary], &["PROBE"])
+        let boundary =
+            PartOfBoundary { name: "BOUNDARY", support, foundation, moves: true, is_open: true };
+        Self::new((&["MATERIAL"], &[true; 2]), &[boundary], &["PROBE"])
     }
 
     /// Adds several figures of one part. Each has a kind, a label in which @ stands for the name of the part, a dimension, and which
@@ -311,9 +374,9 @@ impl Figures {
                 (Dimension::Zeta, ..) => "zeta_min".to_owned(),
                 (Dimension::Length, Of::Probe(of), _) => format!("u at {of}"),
                 (Dimension::Stress, Of::Probe(of), _) => format!("stress at {of}"),
-                (Dimension::Stress, Of::Material(of), _) => format!("stress in {of}"),
-                (Dimension::Stress, Of::Body, kind) if kind != "pressure_max" => {
-                    "stress".to_owned()
+                (Dimension::Stress, Of::Material(_) | Of::Body, kind) if kind != "pressure_max" => {
+                    let away = if kind.ends_with("_away") { " away" } else { "" };
+                    format!("stress{place}{away}")
                 }
                 _ => kind.to_owned(),
             };

@@ -23,6 +23,8 @@ pub(crate) struct Observation {
     /// The largest von Mises stress, the largest σ₁ and the smallest σ₂, Pa: first those of the body, then those of each
     /// material if there are several.
     pub stresses: Vec<[Value; 3]>,
+    /// The same away from singular points.
+    pub away: Vec<[Value; 3]>,
     /// The strains and ζ of the stresses. The strains are zero if the body only moves rigidly.
     pub strained: Strained,
     /// The figures of Γ_C, then those of each foundation.
@@ -82,6 +84,7 @@ impl Observation {
             state.zeta.iter().zip(&body.mesh.nodes).take(body.vertices.partition.owned());
         let least = greatest(comm, vertices.map(|(zeta, at)| (-zeta, *at)));
         let strained = NodalStress::strained(problem, &problem.strained(state));
+        let [stresses, away] = problem.extreme_stresses(&strained, &problem.rays(state))?;
         let active = state.of_contact().filter(|point| point.active);
         Ok(Self {
             zeta_min: Value { value: -least.value, ..least },
@@ -90,7 +93,8 @@ impl Observation {
             work: partition.dot(load, &state.u, 2),
             // An empty sum is -0.0.
             contact_force: comm.total(active.map(|point| point.force).sum()) + 0.0,
-            stresses: problem.extreme_stresses(&strained, &problem.rays(state))?,
+            stresses,
+            away,
             strained,
             contact: [of_rows(&rows)].into_iter().chain(foundations).collect(),
             resultants,
