@@ -7,8 +7,7 @@ use crate::{
     mesh::{TIES, distance, extent},
     model::von_mises,
     observe::{
-        ContactRow, Dimension, Figure, Known, NodalStress, ObservedProblem, Of, Rays, Value,
-        rows_of, sizes,
+        ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Rays, Value, rows_of,
     },
     petsc::PetscError,
     problem::State,
@@ -28,8 +27,7 @@ pub struct Extreme {
     pub singular: Option<String>,
     /// If the mesh does not resolve it, as at a peak of the contact pressure: the reason.
     pub unresolved: Option<String>,
-    /// What finer meshes may add to it, Pa: to the extreme over the directions at a corner, what stresses elsewhere exceed it by; to a
-    /// pressure, what kinks of the gap add. It is infinite if no bar can bear it.
+    /// What kinks of the gap add to a pressure on finer meshes, Pa; infinite if no bar can bear it.
     pub(super) growth: f64,
 }
 
@@ -87,10 +85,6 @@ impl<'a> Extremes<'a> {
         let near = extremes.near(&unresolved);
         extremes.all.iter_mut().zip(near).for_each(|(of, name)| of.unresolved = name);
         extremes.find_jumps(&rays);
-        let corners = Known::all(problem, &rays, |i| sizes(extremes.stresses[i]));
-        for i in 0..extremes.all.len() {
-            extremes.all[i].growth = extremes.excess(&extremes.all[i], values, &corners);
-        }
         extremes.add_kinks(&problem.kinks(state, &extremes.rows), values);
         Ok(extremes)
     }
@@ -118,23 +112,6 @@ impl<'a> Extremes<'a> {
                 extreme.growth = f64::INFINITY;
             }
         }
-    }
-
-    /// By what stresses elsewhere exceed the extreme over the directions at a corner, Pa; 0 for others. Collective.
-    fn excess(&self, of: &Extreme, values: &[Value], corners: &[Known]) -> f64 {
-        let figure = &self.problem.figures[of.number];
-        let kinds = ["von_mises_max", "principal_max", "principal_min"];
-        let Some(k) = kinds.iter().position(|kind| *kind == figure.kind) else { return 0.0 };
-        if corners.iter().all(|corner| corner.at != of.at) {
-            return 0.0;
-        }
-        let points = self.problem.nodal_stress().points.iter().enumerate();
-        let points = points.filter(|(i, point)| {
-            self.is_in(figure, point.material) && !corners.iter().any(|of| of.is_near(*i, point))
-        });
-        let largest = points.map(|(i, _)| sizes(self.stresses[i])[k]).fold(0.0, f64::max);
-        let excess = largest - figure.size(values[of.number].value);
-        self.problem.body.comm().max(excess.max(0.0))
     }
 
     /// Does a figure of stresses describe this material?

@@ -32,7 +32,7 @@ pub struct Rays<'a> {
 }
 
 /// The extremes over the directions at a corner.
-pub(crate) struct Known<'a> {
+pub(super) struct Known<'a> {
     pub(crate) at: [f64; 2],
     /// Per material: F of the von Mises stress, σ₁ and −σ₂, Pa; −∞ if it is not at the corner.
     pub(super) extremes: Vec<[f64; 3]>,
@@ -42,7 +42,7 @@ pub(crate) struct Known<'a> {
 }
 
 /// The von Mises stress, σ₁ and −σ₂ of (σ_xx, σ_yy, σ_xy, σ_zz), Pa.
-pub(crate) fn sizes(stress: [f64; 4]) -> [f64; 3] {
+pub(super) fn sizes(stress: [f64; 4]) -> [f64; 3] {
     let [most, least] = principal(stress);
     [von_mises(stress), most, -least]
 }
@@ -71,7 +71,7 @@ impl ObservedProblem {
 
 impl Known<'_> {
     /// The corners with known extremes, where `sizes_at` gives the [`sizes`] of the fits at the point with a number. Collective.
-    pub(crate) fn all<'a>(
+    pub(super) fn all<'a>(
         problem: &ObservedProblem,
         rays: &'a [Rays],
         sizes_at: impl Fn(usize) -> [f64; 3],
@@ -104,7 +104,7 @@ impl Known<'_> {
     }
 
     /// Is the point of this rank with the number `i` next to the corner, in a material of the corner?
-    pub(crate) fn is_near(&self, i: usize, point: &Point) -> bool {
+    pub(super) fn is_near(&self, i: usize, point: &Point) -> bool {
         self.near[i] && self.extremes[point.material][0] > f64::NEG_INFINITY
     }
 

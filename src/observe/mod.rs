@@ -21,7 +21,6 @@ mod supports;
 pub(crate) use contact_figures::{ContactFigures, rows_of};
 pub use contact_line::{ContactLine, ContactRow};
 pub use corners::Rays;
-pub(crate) use corners::{Known, sizes};
 pub use figures::{Bar, Dimension, Figure, Figures, Of, Value, in_words};
 pub(crate) use figures::{FIRST_CONTACT, NEGLIGIBLE_DAMAGE, Observation, SHOWN_AS_ZERO};
 pub use nodal_stress::{NodalStress, Strained, principal, principal_direction};

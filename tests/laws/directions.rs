@@ -6,7 +6,7 @@ use crate::{
     support::{problem, square},
 };
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
-use signorini::{evolution::State, observe::principal};
+use signorini::evolution::State;
 
 /// The factors of a, b, c and d in σ_θθ, σ_rθ and σ_rr.
 fn airy(theta: f64) -> [[f64; 4]; 3] {
@@ -106,21 +106,14 @@ fn every_sector_has_airys_stresses_and_neighbours_share_tractions_and_strains() 
     }
 }
 
-/// One material alone has a uniform stress there: two of its components are as many as those of the load.
+/// At an axis of symmetry Airy's function has a and c alone: the stress of each material is uniform, in the half as in the whole.
 #[test]
-fn half_of_a_symmetric_wedge_has_the_stresses_of_the_whole() {
+fn a_symmetric_wedge_has_a_uniform_stress_in_each_material() {
     let load = |degrees: f64| traction(degrees.to_radians(), true, -1.0, 2.0);
     assert_eq!(rays(&[(40.0, 1.0)], ["symmetry = true", &load(40.0)]), None);
-    let half =
-        rays(&[(30.0, 1.0), (20.0, 4.0)], ["symmetry = true", &load(50.0)]).expect("a corner");
-    // The mirror image of the load is on the first side of the whole, turned by 50°.
+    assert_eq!(rays(&[(30.0, 1.0), (20.0, 4.0)], ["symmetry = true", &load(50.0)]), None);
     let sectors = [(20.0, 4.0), (30.0, 1.0), (30.0, 1.0), (20.0, 4.0)];
-    let whole =
-        rays(&sectors, [&traction(0.0, false, -1.0, -2.0), &load(100.0)]).expect("a corner");
-    for (own, other) in half.iter().zip(&whole[half.len()..]) {
-        let [own, other] = [own, other].map(|(_, [xx, yy, xy])| principal([*xx, *yy, *xy, 0.0]));
-        (0..2).for_each(|k| assert!((own[k] - other[k]).abs() < 1e-9, "{own:?}, {other:?}"));
-    }
+    assert_eq!(rays(&sectors, [&traction(0.0, false, -1.0, -2.0), &load(100.0)]), None);
 }
 
 /// On a half-plane with pressure p on one half of its boundary, σ_xx = c − p(θ − sin θ cos θ)/π and σ_yy = −p(θ + sin θ cos θ)/π:
