@@ -89,24 +89,30 @@ impl<'a> Extremes<'a> {
         Ok(extremes)
     }
 
-    /// Makes the largest pressures infinite that finer meshes exceed at a kink of the gap by a part that is seen, or by half of the accuracy. The bar
-    /// of others bears the part.
+    /// Makes the largest pressure, and the smallest σ₂, which is its opposite at a kink of the gap, infinite if finer meshes exceed it there
+    /// by a part that is seen, or by half of the accuracy. The bar of others bears the part. Collective.
     fn add_kinks(&mut self, kinks: &[Kink], values: &[Value]) {
-        let accuracy = self.problem.scene().accuracy.unwrap_or(1.0);
+        let (problem, points) = (self.problem, &self.problem.nodal_stress().points);
+        let accuracy = problem.scene().accuracy.unwrap_or(1.0);
         for extreme in &mut self.all {
-            let (figure, shown) =
-                (&self.problem.figures[extreme.number], values[extreme.number].value);
+            let figure = &problem.figures[extreme.number];
+            let shown = figure.size(values[extreme.number].value);
             let is_there = |kink: &&Kink| match &figure.of {
                 Of::Boundary(name) => kink.boundary == *name,
+                Of::Material(name) => problem.body.comm().any(points.iter().any(|point| {
+                    let is_of = problem.materials.contains(&(point.material, name.clone()));
+                    is_of && kink.nodes.contains(&point.at)
+                })),
                 _ => true,
             };
-            let kinks = kinks.iter().filter(is_there).filter(|_| figure.is_pressure());
+            let bears = figure.is_pressure() || figure.kind == "principal_min";
+            let kinks = kinks.iter().filter(|_| bears).filter(is_there);
             let Some(kink) = kinks.max_by(|a, b| a.pressure.total_cmp(&b.pressure)) else {
                 continue;
             };
             extreme.growth = (kink.pressure - shown).max(0.0);
             if extreme.growth > SEEN.min(0.5 * accuracy) * shown {
-                let place = self.problem.mesh().place(kink.at);
+                let place = problem.mesh().place(kink.at);
                 extreme.singular =
                     Some(format!("a kink of the gap of `{}` at {place}", kink.boundary));
                 extreme.growth = f64::INFINITY;

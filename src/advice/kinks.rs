@@ -28,7 +28,7 @@ pub(crate) struct Kink {
     pub(crate) boundary: String,
     pub(crate) at: [f64; 2],
     /// The nodes of its edge, or its node, m.
-    nodes: Vec<[f64; 2]>,
+    pub(crate) nodes: Vec<[f64; 2]>,
     /// (g₁ + g₂)/2α.
     change: f64,
     /// h, m.

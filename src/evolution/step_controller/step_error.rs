@@ -59,7 +59,7 @@ impl StepController<'_> {
     }
 
     /// Transports the bounds on the error through a step to ζ_n = `zeta`, with its `source`, and adds the lowest and the highest of the
-    /// `errors` of the step. ζ̃_n is `zeta` plus the `correction`. Collective.
+    /// `errors` of the step. ζ̃_n is `zeta` plus the `correction`. Does a bound reach ζ_*? Collective.
     ///
     /// # Errors
     /// PETSc failed.
@@ -69,8 +69,8 @@ impl StepController<'_> {
         errors: [DVector<f64>; 2],
         (zeta, source, correction): (&DVector<f64>, &SourceLoad, &DVector<f64>),
         damage_step: &mut DamageStep,
-    ) -> Result<(), RunError> {
-        let threshold = self.problem.threshold();
+    ) -> Result<bool, RunError> {
+        let (threshold, mut reached) = (self.problem.threshold(), false);
         for (i, error) in errors.into_iter().enumerate() {
             let (earlier, rate) = (&self.history.errors[i], &self.history.error_rates[i]);
             let predicted = earlier + planned.length * rate + &error;
@@ -80,12 +80,10 @@ impl StepController<'_> {
             // A bound beyond ζ_* says no more.
             let most = -(zeta + correction).add_scalar(-threshold);
             let reaches = error.iter().zip(&most).any(|(error, most)| error <= most);
-            if self.problem.body.comm().any(reaches) {
-                self.history.may_stop.get_or_insert(planned.time);
-            }
+            reached |= self.problem.body.comm().any(reaches);
             (self.history.errors[i], self.history.error_rates[i]) = (error.sup(&most), after);
         }
-        Ok(())
+        Ok(reached)
     }
 
     /// φ(û, ζ + e) − φ(u, ζ) at the nodes for e = `error`, 1/s, where `source` is that of u and ζ. Collective.
