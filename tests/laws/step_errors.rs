@@ -95,8 +95,7 @@ fn errors_that_add_up_or_grow_are_estimated() {
     }
 }
 
-/// At the singular end of its contact the source is far larger than the damage that diffusion leaves there. The mean source around
-/// a vertex is less than the one that the damage step integrates, so that the error of Euler's steps is estimated too large.
+/// At the singular end of its contact the source is far larger than the damage that diffusion leaves there.
 #[test]
 fn the_error_is_known_where_a_singular_point_drives_the_damage() {
     let [coarse, fine] =
@@ -109,7 +108,7 @@ fn the_error_is_known_where_a_singular_point_drives_the_damage() {
     let error = norm(&mut estimated.last.state.zeta.iter().zip(&exact).map(|(a, b)| a - b));
     let ratio =
         estimated.errors.damage_steps.unwrap() * norm(&mut exact.iter().map(|z| 1.0 - z)) / error;
-    assert!((0.7..3.0).contains(&ratio), "estimated over true: {ratio:.2}");
+    assert!((0.7..1.5).contains(&ratio), "estimated over true: {ratio:.2}");
 }
 
 /// A run with its error bars, and the values of max |u| of all steps.
