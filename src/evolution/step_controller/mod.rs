@@ -65,8 +65,10 @@ pub(super) struct StepState {
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: SourceLoad,
     load_change: DVector<f64>,
-    /// The lower and the upper bound on the error of ζ̃ from the steps so far, and the changes of the source by them, 1/s.
+    /// The lower and the upper bound on the error of ζ̃ from the steps so far, their changes in the last step, and the changes of the
+    /// source by them, 1/s.
     errors: [DVector<f64>; 2],
+    error_changes: [DVector<f64>; 2],
     error_rates: [DVector<f64>; 2],
     /// The time at which the lower bound reached ζ_*, if it did, and by how much the error then delays a stop, s.
     may_stop: Option<[f64; 2]>,
@@ -107,6 +109,7 @@ impl<'a> StepController<'a> {
             source,
             load_change: zeros.clone(),
             errors: [zeros.clone(), zeros.clone()],
+            error_changes: [zeros.clone(), zeros.clone()],
             error_rates: [zeros.clone(), zeros.clone()],
             may_stop: None,
             last_error: zeros,

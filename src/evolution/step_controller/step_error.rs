@@ -6,7 +6,8 @@
 //!
 //! e_n = D (e_{n−1} + ½ k (δφ_{n−1} + δφ_n) + error of the step),
 //!
-//! where D is the diffusion of one step, and δφ_n is taken at a predicted e_n.
+//! where D is the diffusion of one step, and δφ_n is taken at the e_n that the last two errors extrapolate: before it diffuses, the
+//! error of a step may be far too large at a singular point.
 //!
 //! The strains of û are not solved for. In a bar under one force, of parts in series, they are known: ε̂ = r ε with
 //! r = ζ/(ζ + e), or if its ends are prescribed, ε̂ = r/⟨r⟩ ε with the mean ⟨r⟩ by the strain energy. In other bodies ∫ζ ε:𝒜 dε is
@@ -71,17 +72,22 @@ impl StepController<'_> {
         damage_step: &mut DamageStep,
     ) -> Result<bool, RunError> {
         let (threshold, mut reached) = (self.problem.threshold(), false);
+        let omega = planned.length / self.history.length;
         for (i, error) in errors.into_iter().enumerate() {
             let (earlier, rate) = (&self.history.errors[i], &self.history.error_rates[i]);
-            let predicted = earlier + planned.length * rate + &error;
+            let predicted = earlier + omega * &self.history.error_changes[i];
             let after = self.source_change(zeta, source, &(predicted + correction))?;
-            let mut error = earlier + 0.5 * planned.length * (rate + &after) + error;
+            let mut error = earlier + 0.5 * planned.length * (rate + after) + error;
             damage_step.diffuse(planned, &mut error)?;
             // A bound beyond ζ_* says no more.
             let most = -(zeta + correction).add_scalar(-threshold);
             let reaches = error.iter().zip(&most).any(|(error, most)| error <= most);
             reached |= self.problem.body.comm().any(reaches);
-            (self.history.errors[i], self.history.error_rates[i]) = (error.sup(&most), after);
+            let error = error.sup(&most);
+            self.history.error_rates[i] =
+                self.source_change(zeta, source, &(&error + correction))?;
+            self.history.error_changes[i] = &error - &self.history.errors[i];
+            self.history.errors[i] = error;
         }
         Ok(reached)
     }
