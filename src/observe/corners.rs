@@ -79,12 +79,23 @@ impl Known<'_> {
         let nodal = problem.nodal_stress();
         let known = |rays: &'a Rays| {
             let mut extremes = vec![[f64::NEG_INFINITY; 3]; nodal.materials.len()];
-            let mut by_direction = Vec::new();
-            for &(material, [xx, yy, xy]) in rays.stresses.as_ref()? {
+            let (mut by_direction, stresses) = (Vec::new(), rays.stresses.as_ref()?);
+            for &(material, [xx, yy, xy]) in stresses {
                 let zz = nodal.materials[material].0.out_of_plane(&Vector3::new(xx, yy, xy));
                 let of = sizes([xx, yy, xy, zz]);
                 (0..3).for_each(|k| extremes[material][k] = of[k].max(extremes[material][k]));
                 by_direction.push(of);
+            }
+            // Between directions an extreme is that of a parabola through three of them.
+            for (sizes, rays) in by_direction.windows(3).zip(stresses.windows(3)) {
+                for k in (0..3).filter(|_| rays[0].0 == rays[2].0) {
+                    let [before, own, after]: [f64; 3] = [0, 1, 2].map(|i| sizes[i][k]);
+                    if own > before.max(after) {
+                        let bend = 2.0 * own - before - after;
+                        let largest = own + (after - before).powi(2) / (8.0 * bend);
+                        extremes[rays[0].0][k] = largest.max(extremes[rays[0].0][k]);
+                    }
+                }
             }
             let mut excess = vec![[0.0; 3]; extremes.len()];
             let near = rays.near(problem);

@@ -22,7 +22,7 @@ use nalgebra::{
 };
 use std::f64::consts::{PI, TAU};
 
-/// Parts of each sector between directions. An extreme between two of them is larger by (π/256)²/8 of its second derivative, 2e-5.
+/// Parts of each sector between directions.
 const RAYS: usize = 256;
 
 /// A corner of the boundary at which stresses are not singular for their exponents λ.

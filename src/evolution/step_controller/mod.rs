@@ -70,8 +70,8 @@ pub(super) struct StepState {
     errors: [DVector<f64>; 2],
     error_changes: [DVector<f64>; 2],
     error_rates: [DVector<f64>; 2],
-    /// The time at which the lower bound reached ζ_*, if it did, and by how much the error then delays a stop, s.
-    may_stop: Option<[f64; 2]>,
+    /// The time at which the lower bound reached ζ_*, if it did, s.
+    may_stop: Option<f64>,
     /// e_n of the last step, which ζ_n lacks.
     last_error: DVector<f64>,
     /// Bounds on ζ̃_{n−1} by the maximum principle, see [`BoundViolation`].
@@ -223,8 +223,8 @@ impl<'a> StepController<'a> {
         self.history.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.history.length = planned.length;
         self.history.last_error = correction;
-        if reaches && self.history.may_stop.is_none() {
-            self.history.may_stop = Some([planned.time, self.delay(&damage.zeta, &rate)]);
+        if reaches {
+            self.history.may_stop.get_or_insert(planned.time);
         }
         self.history.change = &corrected - &self.history.zeta;
         self.history.zeta = corrected;
@@ -261,30 +261,26 @@ impl<'a> StepController<'a> {
             planned.time
         };
         self.history.violation.observe(planned, damage.min_max, time);
-        let [_, rate_now, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
+        let (upper, bar) = (self.upper_bound().abs(), self.step_bar());
+        let [upper, bar, rate, rate_before] =
+            self.at_weakest_node(&damage.zeta, &rate, [&upper, &bar]);
+        // An error δζ delays the stop by δζ/ζ′. ζ may fall faster and faster, or the load may pass: so ζ′ is the smaller one of
+        // the last rate and of the rate at the beginning of the step, about the mean of the rates of both steps.
+        let slower = rate.abs().min(0.5 * (rate + rate_before).abs());
         // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
         // by at most half of their relative difference, as a fraction of the step. With uniform steps the last step is the bar.
         let of_step = match self.error_control {
-            Some(_) => (0.5 * ((rate_now - rate_before) / rate_now).abs()).min(1.0),
+            Some(_) => (0.5 * ((rate - rate_before) / rate).abs()).min(1.0),
             None => 1.0,
         };
         let uncertainty = match self.history.may_stop {
-            // The lower bound reached ζ_* in an earlier step; from then on it grows without limit.
-            Some([earliest, delay]) => planned.length + delay.max(time - earliest),
-            None => of_step * planned.length + self.delay(&damage.zeta, &rate),
+            // The lower bound reached ζ_* in an earlier step, where it ends.
+            Some(earliest) => planned.length + (upper / slower).max(time - earliest),
+            None => of_step * planned.length + bar / slower,
         };
         let least_admissible = planned.bounds.0;
         let stop = Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None };
         Decision::Stop(stop)
-    }
-
-    /// By how much the error of `zeta` delays a stop, s. Collective.
-    ///
-    /// An error δζ delays it by δζ/ζ′. ζ may fall faster and faster, or the load may pass: so ζ′ is the smaller one of the last
-    /// `rate` and of that at the beginning of the step, about the mean of the rates of both steps.
-    fn delay(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> f64 {
-        let [error, rate, rate_before] = self.at_weakest_node(zeta, rate);
-        error / rate.abs().min(0.5 * (rate + rate_before).abs())
     }
 
     /// Decides about a step whose solves failed: with adaptive steps, a shorter one may succeed.
@@ -311,7 +307,7 @@ impl<'a> StepController<'a> {
 
     /// The time at which ζ may have reached ζ_*, within its error from the time steps, s.
     pub(crate) fn may_stop(&self) -> Option<f64> {
-        self.history.may_stop.map(|[earliest, _]| earliest)
+        self.history.may_stop
     }
 
     pub(crate) fn violation(&self) -> BoundViolation {
