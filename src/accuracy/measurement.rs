@@ -235,6 +235,7 @@ impl Measurement {
             dimension => sequence.error(i, matches!(dimension, Dimension::Stress)),
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
+        self.result.energy = coarse.history.energy;
         let Measured { bars, not_converged, .. } = &mut self.result;
         *bars = problem.bars(&errors, &coarse.scales(not_converged));
         bars.retain(|bar| !not_converged.contains(&bar.name));

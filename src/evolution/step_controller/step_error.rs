@@ -86,7 +86,8 @@ impl StepController<'_> {
                 self.history.may_stop.get_or_insert(planned.time);
             }
             let error = error.sup(&most);
-            self.history.error_rates[i] = self.source_change(zeta, source, &(&error + correction))?;
+            self.history.error_rates[i] =
+                self.source_change(zeta, source, &(&error + correction))?;
             self.history.error_changes[i] = &error - &self.history.errors[i];
             self.history.errors[i] = error;
         }
