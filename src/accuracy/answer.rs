@@ -40,7 +40,7 @@ pub(super) struct History {
     squares: Vec<f64>,
     worst: f64,
     /// max_t ‖u‖², N m per metre of thickness, and the maximum |u| at any time, m.
-    energy: f64,
+    pub(super) energy: f64,
     pub(super) displacement: f64,
     /// At the last time, with the recovered strains ε*: ‖ε* − ε(u)‖²_T per triangle, their sum, and ‖u‖².
     end: (Vec<f64>, f64, f64),

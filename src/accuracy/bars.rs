@@ -87,21 +87,21 @@ impl Outcome {
         (0.0 < factor && factor < 1.0).then_some(factor.max(1.0 / 64.0))
     }
 
-    /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end
-    /// in a less damaged state: their relative errors count. Returns the scales of the bars in the last state. An extreme
-    /// that grows is no scale.
+    /// Takes the scales of the bars from this run. The runs that measured the errors of the mesh have few steps and may end in a
+    /// less or more damaged state: their relative or absolute errors count, whichever are larger. Returns the scales of the bars
+    /// in the last state. An extreme that grows is no scale.
     fn set_scales(&mut self, problem: &ObservedProblem, measured: &Measured) -> Vec<f64> {
-        let scales = |sizes: &[f64], forces: f64| {
-            let scales = problem.figure_scales(sizes, &measured.not_converged, 0.0, forces);
+        let scales = |sizes: &[f64], energy: f64, forces: f64| {
+            let scales = problem.figure_scales(sizes, &measured.not_converged, energy, forces);
             let of = |bar: &Bar| problem.figures.number(&bar.name).map_or(0.0, |i| scales[i]);
             Vec::from_iter(self.bars.iter().map(of))
         };
-        let largest = scales(&self.sizes(problem), self.last.forces);
+        let largest = scales(&self.sizes(problem), measured.energy, self.last.forces);
         let last = self.last.figures.iter().map(|of| of.value);
-        let now = scales(&problem.figures.magnitudes(last), 0.0);
+        let now = scales(&problem.figures.magnitudes(last), 0.0, 0.0);
         for (bar, scale) in self.bars.iter_mut().zip(largest) {
-            if scale > bar.scale && bar.scale > 0.0 {
-                bar.bar *= scale / bar.scale;
+            if scale > 0.0 && bar.scale > 0.0 {
+                bar.bar *= (scale / bar.scale).max(1.0);
                 bar.scale = scale;
             }
         }

@@ -250,6 +250,7 @@ impl Measurement {
             }
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));
+        self.result.energy = coarse.history.energy;
         let Measured { bars, not_converged, .. } = &mut self.result;
         let infinite = coarse.extremes.all.iter().filter(|of| of.growth.is_infinite());
         not_converged.extend(infinite.map(|of| of.name.clone()));

@@ -87,6 +87,8 @@ pub struct Measured {
     pub bars: Vec<Bar>,
     /// The names of the extremes that do not converge over the meshes. They have no bars.
     pub not_converged: Vec<String>,
+    /// max_t ‖u‖² of the run with few steps, N m per metre of thickness.
+    pub energy: f64,
     /// The error bar of the time of ζ_*, s.
     pub stop: Option<f64>,
     /// The relative error of the damage ζ₀ − ζ in L² at the end; `None` without damage.

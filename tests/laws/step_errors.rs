@@ -243,8 +243,8 @@ fn a_run_that_may_have_missed_the_end_of_the_body_says_so() {
     }
 }
 
-/// A growing stress σ until 0.95 of the body's life: ζ³ = 1 − 0.95 t³, u = σ/(Eζ). Runs with few steps lag behind: they end in a
-/// less damaged state.
+/// A growing stress σ until 0.95 of the body's life: ζ³ = 1 − 0.95 t³, u = σ/(Eζ). Runs with few steps end in a less or
+/// more damaged state.
 #[test]
 fn the_scale_of_a_bar_is_the_largest_value_of_the_run() {
     let load = "{ name = 'right', traction = ['t', 0] }";
