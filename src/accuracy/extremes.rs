@@ -193,7 +193,7 @@ impl<'a> Extremes<'a> {
             let is_here = |place: &[f64; 2]| distance(*place, at) <= rounding;
             let singular =
                 points.iter().find(|of| is_here(&of.at) && !(of.is_open && presses(of.at)));
-            let by_direction = self.directions.iter().any(|place| is_here(place));
+            let by_direction = self.directions.iter().any(is_here);
             let reason = "it depends on the direction there".to_owned();
             (figure.dimension == Dimension::Stress && (singular.is_some() || by_direction)).then(
                 || Extreme {

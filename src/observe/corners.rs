@@ -8,7 +8,7 @@
 use super::{NodalStress, ObservedProblem, nodal_stress::Point, principal};
 use crate::{
     model::von_mises,
-    problem::{Corner, Effect, State},
+    problem::{Corner, Effect, Ray, State},
 };
 use nalgebra::Vector3;
 use rustc_hash::FxHashSet as HashSet;
@@ -27,7 +27,7 @@ pub struct Rays<'a> {
     /// The corner, m.
     pub at: [f64; 2],
     /// Per direction: the material, and (σ_xx, σ_yy, σ_xy), Pa; `None` if other loads than those on the sides determine them.
-    pub stresses: Option<Vec<(usize, [f64; 3])>>,
+    pub stresses: Option<Vec<Ray>>,
     of: &'a LoadedCorner,
 }
 

@@ -49,6 +49,9 @@ pub(super) struct Side {
     pub(super) boundaries: Vec<usize>,
 }
 
+/// The material in a direction, and (σ_xx, σ_yy, σ_xy) there, Pa.
+pub type Ray = (usize, [f64; 3]);
+
 /// What the loads do at a corner.
 #[derive(Debug, Clone)]
 pub(crate) enum Effect {
@@ -58,7 +61,7 @@ pub(crate) enum Effect {
     Singular,
     /// Stresses depend on the direction. Per direction: the material, and (σ_xx, σ_yy, σ_xy), Pa; `None` if the loads on the sides do
     /// not determine them.
-    ByDirection(Option<Vec<(usize, [f64; 3])>>),
+    ByDirection(Option<Vec<Ray>>),
 }
 
 impl Corner {
@@ -94,7 +97,7 @@ impl Corner {
         let rays = self.rays(start, unit);
         let largest =
             rays.iter().flat_map(|(_, stress)| stress).fold(0.0, |a: f64, b| a.max(b.abs()));
-        let changes = |(a, b): (&(usize, [f64; 3]), &(usize, [f64; 3]))| {
+        let changes = |(a, b): (&Ray, &Ray)| {
             a.0 == b.0 && (0..3).any(|k| (a.1[k] - b.1[k]).abs() > SEEN * largest)
         };
         let first = |material| rays.iter().find(|ray| ray.0 == material).unwrap_or(&rays[0]);
@@ -122,7 +125,7 @@ impl Corner {
     }
 
     /// The stresses in many directions, from z and ω on the first side.
-    fn rays(&self, start: Vector5<f64>, unit: f64) -> Vec<(usize, [f64; 3])> {
+    fn rays(&self, start: Vector5<f64>, unit: f64) -> Vec<Ray> {
         let (mut z, mut angle, mut rays) = (start, self.sides[0].angle, Vec::new());
         for sector in &self.sectors {
             let step = (sector.system_of_degree_0(unit) * (sector.angle / RAYS as f64)).exp();

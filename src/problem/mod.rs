@@ -21,7 +21,7 @@ mod singular;
 mod state;
 
 pub use collapse::Collapse;
-pub(crate) use directions::{Corner, Effect};
+pub(crate) use directions::{Corner, Effect, Ray};
 pub use error::SetupError;
 pub use loads::Loads;
 use loads::near_jumps;

@@ -185,7 +185,7 @@ fn the_pressure_at_a_kink_grows_by_the_logarithm_of_the_edges() {
     let directory = TestDirectory::new();
     let slope = 0.02;
     let expected = 1000.0 / 0.91 * 2.0 * slope / std::f64::consts::TAU * std::f64::consts::LN_2;
-    let mut pressure = |text: &str, n: usize| {
+    let pressure = |text: &str, n: usize| {
         directory.write("square.msh", &crate::test_directory::square(n));
         directory.write("scene.toml", text);
         directory.run(&[]);

@@ -337,7 +337,7 @@ fn the_bar_of_the_least_zeta_contains_the_overshoot_at_a_jump() {
             let session = Session::start(&[]).unwrap();
             let options = RunOptions::of(&scene);
             let measured =
-                accuracy::measured_errors(&session, &scene, &mesh, &options, None).unwrap();
+                accuracy::measured_errors(&session, &scene, [&mesh; 2], &options, None).unwrap();
             outcome.set_bars(&problem, &measured).expect("PETSc works");
             let (zeta, bar) = (outcome.last.record.zeta_min, bar(&outcome.bars, "zeta_min"));
             println!("P{order}, {n}: {zeta} ± {bar} for {exact}");
