@@ -87,7 +87,7 @@ impl LoopState {
     }
 
     /// The factor for the tolerance of the time steps of a repetition of the run of `problem` with this `outcome`. `None` if there
-    /// is none: its time steps are short enough, [`Self::is_last`] is true, or there is no time, with the seconds `passed`
+    /// is none: its time steps are short enough, it is the last rung, or there is no time, with the seconds `passed`
     /// since the start and those of the run.
     pub fn shorter_steps(
         &self,
