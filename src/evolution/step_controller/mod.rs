@@ -70,6 +70,8 @@ pub(super) struct StepState {
     errors: [DVector<f64>; 2],
     error_changes: [DVector<f64>; 2],
     error_rates: [DVector<f64>; 2],
+    /// The times of the accepted steps, s, and min ζ then.
+    path: Vec<[f64; 2]>,
     /// The time at which the lower bound reached ζ_*, if it did, s.
     may_stop: Option<f64>,
     /// e_n of the last step, which ζ_n lacks.
@@ -111,6 +113,7 @@ impl<'a> StepController<'a> {
             errors: [zeros.clone(), zeros.clone()],
             error_changes: [zeros.clone(), zeros.clone()],
             error_rates: [zeros.clone(), zeros.clone()],
+            path: Vec::new(),
             may_stop: None,
             last_error: zeros,
             bounds: problem.body.vertices.partition.min_max(zeta),
@@ -223,6 +226,7 @@ impl<'a> StepController<'a> {
         self.history.bounds = shifted(tightened, partition.min_max(correction.as_slice()));
         self.history.length = planned.length;
         self.history.last_error = correction;
+        self.history.path.push([planned.time, damage.min_max.0]);
         if reaches {
             self.history.may_stop.get_or_insert(planned.time);
         }
@@ -264,9 +268,6 @@ impl<'a> StepController<'a> {
         let (upper, bar) = (self.upper_bound().abs(), self.step_bar());
         let [upper, bar, rate, rate_before] =
             self.at_weakest_node(&damage.zeta, &rate, [&upper, &bar]);
-        // An error δζ delays the stop by δζ/ζ′. ζ may fall faster and faster, or the load may pass: so ζ′ is the smaller one of
-        // the last rate and of the rate at the beginning of the step, about the mean of the rates of both steps.
-        let slower = rate.abs().min(0.5 * (rate + rate_before).abs());
         // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
         // by at most half of their relative difference, as a fraction of the step. With uniform steps the last step is the bar.
         let of_step = match self.error_control {
@@ -275,12 +276,27 @@ impl<'a> StepController<'a> {
         };
         let uncertainty = match self.history.may_stop {
             // The lower bound reached ζ_* in an earlier step, where it ends.
-            Some(earliest) => planned.length + (upper / slower).max(time - earliest),
-            None => of_step * planned.length + bar / slower,
+            Some(earliest) => planned.length + self.delay(upper, time).max(time - earliest),
+            None => of_step * planned.length + self.delay(bar, time),
         };
         let least_admissible = planned.bounds.0;
         let stop = Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None };
         Decision::Stop(stop)
+    }
+
+    /// By how much an error of min ζ delays a stop at `time`, s: as long as this run took from ζ_* plus the error to ζ_*. The rate at
+    /// the end would say too little, because ζ falls faster and faster.
+    fn delay(&self, error: f64, time: f64) -> f64 {
+        let (threshold, mut after) = (self.problem.threshold(), (time, 0.0));
+        for &[earlier, zeta] in self.history.path.iter().rev() {
+            let excess = zeta - threshold;
+            if excess >= error {
+                let part = (error - after.1) / (excess - after.1);
+                return time - after.0 + part * (after.0 - earlier);
+            }
+            after = (earlier, excess);
+        }
+        time
     }
 
     /// Decides about a step whose solves failed: with adaptive steps, a shorter one may succeed.
