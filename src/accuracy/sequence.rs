@@ -129,13 +129,11 @@ impl<'a> Sequence<'a> {
         ])
     }
 
-    /// Does the figure `i` converge over the meshes, an extreme at the place of `extreme` on the finest mesh? Theory knows the points
-    /// where it does not. Near a singular point, meshes bisected everywhere may contradict theory: the change per
-    /// halving of the size of the triangles there is small, or falls. For a singular stress r^(λ−1) it grows, and for ln r it stays.
+    /// Does the figure `i` converge over the meshes, an extreme at the place of `extreme` on the finest mesh? Its change per halving of the size
+    /// of the triangles there is small, or falls: for a singular stress r^(λ−1) it grows, and for ln r it stays. Near a
+    /// singular point only meshes bisected everywhere contradict theory. Elsewhere an extreme converges until meshes of
+    /// different sizes show that it grows.
     pub(super) fn converges(&self, i: usize, extreme: &Extreme) -> bool {
-        if extreme.is_known() {
-            return true;
-        }
         if extreme.unresolved.is_some() {
             return false;
         }
@@ -149,8 +147,11 @@ impl<'a> Sequence<'a> {
         if last <= SEEN * self.answers[finest].values[i].abs() {
             return true;
         }
+        let first = if extreme.singular.is_some() { self.answer } else { 0 };
         let coarser = |k: &usize| sizes[*k] > 1.5 * sizes[finest - 1];
-        let before = (self.answer..finest - 1).rev().find(coarser);
-        before.is_some_and(|before| last <= SLOWEST * change(before, finest - 1))
+        match (first..finest - 1).rev().find(coarser) {
+            Some(before) => last <= SLOWEST * change(before, finest - 1),
+            None => extreme.singular.is_none(),
+        }
     }
 }

@@ -156,8 +156,8 @@ impl Figure {
     /// no extremes.
     pub fn governs(&self, value: f64, other: Option<f64>) -> bool {
         // A first contact has no value before.
-        let Some(other) = other.filter(|of| !of.is_nan()) else {
-            return self.dimension != Dimension::Place;
+        let Some(other) = other else {
+            return !value.is_nan() && self.dimension != Dimension::Place;
         };
         match self.governing {
             Governing::Largest => value > other,
