@@ -83,8 +83,8 @@ fn a_signal_while_meshes_are_tried_says_so() {
     let runs = asked.map(|asked| {
         let directory = TestDirectory::new();
         directory.write("fine.msh", &square(192));
-        // Where the load ends the answer is singular: no mesh is soon good enough.
-        let load = ["--set", "boundary.top.traction=[0, '-3*t*if(x < 0.5, 1, 0)']"];
+        // Where the shear load ends the answer is singular: no mesh is soon good enough.
+        let load = ["--set", "boundary.top.traction=['t*if(x < 0.5, 1, 0)', '-3*t']"];
         let mut command = directory.command(&[&["run", "scene.toml"], asked, &load].concat());
         let run = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
         (directory, run.expect("the program starts"))
