@@ -2,7 +2,7 @@
 
 use std::{env, fs, path::Path};
 
-/// What to do if there is not enough memory.
+/// Advice for a run without enough memory.
 pub const REMEDY: &str = "take larger triangles, several processes (mpiexec), or multigrid \
                                  (-- -elastic_pc_type gamg -damage_pc_type gamg)";
 

@@ -1,4 +1,4 @@
-//! What is concluded at the end of a run: is the accuracy reached, and what do the error bars not contain?
+//! The conclusion at the end of a run: whether the accuracy is reached, and the errors that the error bars do not contain.
 
 use super::{Adapted, Extreme, LoopState, first_mesh::kinks};
 use crate::{

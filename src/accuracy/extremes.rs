@@ -27,7 +27,7 @@ pub struct Extreme {
     pub singular: Option<String>,
     /// If the mesh does not resolve it, as at a peak of the contact pressure: the reason.
     pub unresolved: Option<String>,
-    /// What kinks of the gap add to a pressure on finer meshes, Pa; infinite if no bar can bear it.
+    /// The part that kinks of the gap add to a pressure on finer meshes, Pa; infinite if no bar can bear it.
     pub(super) growth: f64,
 }
 

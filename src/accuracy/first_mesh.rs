@@ -64,7 +64,7 @@ pub fn first_mesh(scene: &Scene, accuracy: f64) -> Result<Mesh, MeshError> {
     // The smallest ratio of the sizes in one grading. gmsh fails at some strong ones.
     let mut ratio = 0.25_f64;
     for grading in 0..GRADINGS {
-        // What is wrong here is reported for the last mesh.
+        // The same faults are reported for the last mesh.
         let _ = scene.name_edges(&mut first);
         // The end of a slender ellipse is no corner, though it looks like one on the first meshes.
         let is_corner = |kink: &Kink| grading >= 2 && kink.is_corner;

@@ -5,7 +5,7 @@ use signorini::{
     accuracy::Adapted,
     evolution::{Outcome, RunError, StepRecord, Stop, percent},
     mesh::extent,
-    observe::in_words,
+    observe::{FIRST_CONTACT, in_words},
     output::terminal::{Progress, plain, say, with_bar},
     petsc::Communicator,
     printable::print_error,
@@ -246,8 +246,7 @@ fn contact(task: &Task, last: StepRecord, figures: &LastFigures) -> Vec<String> 
     };
     let all = [None].into_iter().chain(several.iter().map(Some)).map(of);
     let first_contact = |name: &String| {
-        let [time, x, y] = ["first_contact", "load_x_at_first_contact", "load_y_at_first_contact"]
-            .map(|kind| format!("{name}.{kind}"));
+        let [time, x, y] = FIRST_CONTACT.map(|kind| format!("{name}.{kind}"));
         figures.value(&time).is_finite().then(|| {
             let [time, x, y] = [figures.full_text(&time), figures.text(&x), figures.full_text(&y)];
             row("", format!("{name}: first contact at t = {time}, under loads of ({x}, {y})"))

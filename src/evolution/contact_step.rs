@@ -37,14 +37,14 @@ use certificate::active_bounds;
 pub use solver_error::Accuracy;
 
 use super::{
-    DiscreteProblem, FirstContact, LoadCase, ObservedProblem, RunError, RunOptions, State, Step,
-    StepFailure, StepRecord, agreed, extrapolation::Extrapolation,
+    DiscreteProblem, LoadCase, ObservedProblem, RunError, RunOptions, State, Step, StepFailure,
+    StepRecord, agreed,
 };
 use crate::{
     contact::{self, Bound, Scales, SharedSolver},
     fem::Stiffness,
-    linear::{FactorState, LinearSolver, Precision},
-    observe::SHOWN_AS_ZERO,
+    linear::{Extrapolation, FactorState, LinearSolver, Precision},
+    observe::{FirstContact, SHOWN_AS_ZERO},
     petsc::{PetscError, Session, Vector, stage},
 };
 use certificate::Candidate;

@@ -1,10 +1,10 @@
 //! A step: its fields and its figures.
 
-use super::{FirstContact, ObservedProblem, State};
+use super::{ObservedProblem, State};
 use crate::{
     contact::{ContactReport, Kkt},
     fem::{DamageCertificate, RigidMotion},
-    observe::{Figure, Observation, Value},
+    observe::{Figure, FirstContact, Observation, Value},
 };
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -99,7 +99,8 @@ pub struct StepRecord {
 impl Step {
     /// Sets the figures and the governing values that follow from the step before; `None` for the first one. Collective.
     pub(super) fn govern(&mut self, problem: &ObservedProblem, before: Option<&Self>) {
-        self.set_first_contact(problem, before);
+        let earlier = before.map(|step| &step.first_contact[..]);
+        problem.set_first_contact(&mut self.figures, &mut self.first_contact, earlier);
         let governing = |(i, (figure, of)): (usize, (&Figure, &Value))| {
             let (before, time) = (before.and_then(|of| of.governing[i]), self.record.time);
             let own = GoverningValue { value: of.value, at: of.at, time };

@@ -23,6 +23,7 @@ mod cholesky;
 mod cholmod;
 #[allow(unsafe_code)]
 mod dense;
+mod extrapolation;
 mod factor;
 mod linear_solver;
 mod linear_system;
@@ -40,6 +41,7 @@ mod raw {
 }
 
 pub use cholesky::{Cholesky, Precision};
+pub use extrapolation::Extrapolation;
 pub use factor::{Factor, FactorState};
 pub use linear_solver::{LinearSolver, SolveReport};
 pub use linear_system::LinearSystem;

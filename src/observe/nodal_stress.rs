@@ -213,7 +213,7 @@ impl ObservedProblem {
         let comm = body.comm();
         let sizes_at = |point: &Point| sizes(nodal.stress(point, of, &fits));
         let corners = Known::all(self, rays, |i| sizes_at(&nodal.points[i]));
-        // Of the points from the number `first` on, and of the corners in their region.
+        // The extremes over a list of points, whose numbers begin with `first`, and over the corners in their region.
         let extremes = |first: usize, points: &[Point], is_in: &dyn Fn(usize, [f64; 2]) -> bool| {
             let mut largest = vec![[(f64::NEG_INFINITY, [0.0; 2]); 3]; nodal.materials.len()];
             for (i, point) in (first..).zip(points) {

@@ -24,7 +24,7 @@ pub struct Matrix {
     handle: Handle<raw::_p_Mat>,
     /// The global indices of the owned rows.
     rows: Range<i32>,
-    /// What multiplies in place of the entries.
+    /// The operator that multiplies in place of the entries.
     shell: Option<Shell>,
 }
 

@@ -52,7 +52,7 @@ pub(super) struct Side {
 /// The material in a direction, and (σ_xx, σ_yy, σ_xy) there, Pa.
 pub type Ray = (usize, [f64; 3]);
 
-/// What the loads do at a corner.
+/// The effect of the loads on the stresses at a corner.
 #[derive(Debug, Clone)]
 pub(crate) enum Effect {
     /// Stresses are continuous.

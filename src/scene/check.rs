@@ -296,7 +296,7 @@ pub(super) fn boundary_key(name: &str, key: &str) -> String {
     format!("boundary.{name}.{key}")
 }
 
-/// What is in a set of this name, from the note of a mesh of another program on its sets without an edge.
+/// The contents of a set of this name, from the note of a mesh of another program on its sets without an edge.
 fn set_without_edges<'m>(mesh: &'m Mesh, name: &str) -> Option<&'m str> {
     let start = format!(" {name} (");
     let mut notes = mesh.notes.iter().filter(|note| note.starts_with("no edge of the boundary"));

@@ -82,7 +82,7 @@ impl<'t> Diagnostics<'t> {
         let document = Value::Boolean(false);
         let mut found = Self { text, scope, document, problems, positions, unsound };
         found.document = found.read(String::new(), root, &ROOT);
-        // What only follows from a wrong constant is left out.
+        // Messages that only follow from a wrong constant are left out.
         let follows = |problem: &str| problem.contains(WITHOUT_VALUE);
         found.problems.retain(|(_, of)| of.starts_with("constants.") || !follows(of));
         found

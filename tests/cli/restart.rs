@@ -72,7 +72,6 @@ fn another_name_of_a_file_that_goes_on() {
 #[test]
 fn a_repetition_with_shorter_steps_goes_on_as_if_it_had_not_been_interrupted() {
     for (damage, top, accuracy) in [
-        ("lambda_u = 8e5", "displacement = ['free', '3e-2*exp(-((t-0.4)/0.002)^2)']", "0.1"),
         ("lambda_u = 800", "traction = [0, '60*t']", "0.001"),
     ] {
         let directory = TestDirectory::new();

@@ -302,7 +302,9 @@ fn a_first_contact_is_off_by_no_more_than_its_bar_which_is_within_its_step() {
             let value = outcome.last.figures[problem.figures.number(name).unwrap()].value;
             let (error, bar) = ((value - exact).abs(), bar(&outcome.bars, name));
             println!("{steps}: {name} = {value} ± {bar} for {exact}");
-            assert!(error <= bar && bar < 1.01 / steps, "{steps}, {name}: {value} ± {bar}");
+            // d(t²)/dt is at most 2.
+            let most = if name.ends_with("bottom.first_contact") { 1.01 } else { 2.0 } / steps;
+            assert!(error <= bar && bar < most, "{steps}, {name}: {value} ± {bar}");
         }
     }
     // It stays open, or touches from the start.

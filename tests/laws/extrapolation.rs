@@ -1,6 +1,6 @@
 //! What iterative solvers start from: the solutions so far, carried on in time.
 
-use signorini::{evolution::Extrapolation, petsc::Communicator};
+use signorini::{linear::Extrapolation, petsc::Communicator};
 
 #[test]
 fn a_quadratic_evolution_is_predicted_exactly_from_uneven_times() {

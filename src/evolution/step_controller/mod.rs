@@ -265,38 +265,38 @@ impl<'a> StepController<'a> {
             planned.time
         };
         self.history.violation.observe(planned, damage.min_max, time);
-        let (upper, bar) = (self.upper_bound().abs(), self.step_bar());
-        let [upper, bar, rate, rate_before] =
-            self.at_weakest_node(&damage.zeta, &rate, [&upper, &bar]);
+        let [bar, rate, rate_before] = self.at_weakest_node(&damage.zeta, &rate);
         // The time is interpolated with a constant rate. If the rate changes linearly from `rate_before` to `rate`, it is off
         // by at most half of their relative difference, as a fraction of the step. With uniform steps the last step is the bar.
         let of_step = match self.error_control {
             Some(_) => (0.5 * ((rate - rate_before) / rate).abs()).min(1.0),
             None => 1.0,
         };
+        let delay = self.delay(bar, rate.abs().min(0.5 * (rate + rate_before).abs()), time);
         let uncertainty = match self.history.may_stop {
             // The lower bound reached ζ_* in an earlier step, where it ends.
-            Some(earliest) => planned.length + self.delay(upper, time).max(time - earliest),
-            None => of_step * planned.length + self.delay(bar, time),
+            Some(earliest) => planned.length + delay.max(time - earliest),
+            None => of_step * planned.length + delay,
         };
         let least_admissible = planned.bounds.0;
         let stop = Stop { time, zeta_min, least_admissible, uncertainty, from_mesh: None };
         Decision::Stop(stop)
     }
 
-    /// By how much an error of min ζ delays a stop at `time`, s: as long as this run took from ζ_* plus the error to ζ_*. The rate at
-    /// the end would say too little, because ζ falls faster and faster.
-    fn delay(&self, error: f64, time: f64) -> f64 {
-        let (threshold, mut after) = (self.problem.threshold(), (time, 0.0));
+    /// By how much an `error` of min ζ delays a stop at `time`, s: by the larger one of two times. This run took the first one from
+    /// ζ_* + `error` to ζ_*, and would have taken longer if it had been less damaged. With the present `rate` ζ falls by the error in the second
+    /// one, which is long if the load passes: the body may survive.
+    fn delay(&self, error: f64, rate: f64, time: f64) -> f64 {
+        let (threshold, mut after) = (self.problem.threshold(), [time, 0.0]);
         for &[earlier, zeta] in self.history.path.iter().rev() {
-            let excess = zeta - threshold;
-            if excess >= error {
-                let part = (error - after.1) / (excess - after.1);
-                return time - after.0 + part * (after.0 - earlier);
+            let before = [earlier, zeta - threshold];
+            if before[1] >= error {
+                let part = (error - after[1]) / (before[1] - after[1]);
+                return (time - after[0] + part * (after[0] - earlier)).max(error / rate);
             }
-            after = (earlier, excess);
+            after = before;
         }
-        time
+        time.max(error / rate)
     }
 
     /// Decides about a step whose solves failed: with adaptive steps, a shorter one may succeed.

@@ -30,13 +30,9 @@ impl StepController<'_> {
 
     /// The error bar of ζ from the time steps, at the nodes.
     pub(crate) fn step_bar(&self) -> DVector<f64> {
-        let lower = &self.history.errors[0] + &self.history.last_error;
-        lower.abs().sup(&self.upper_bound().abs())
-    }
-
-    /// The upper bound on the error of the last accepted ζ from the time steps, at the nodes.
-    pub(super) fn upper_bound(&self) -> DVector<f64> {
-        &self.history.errors[1] + &self.history.last_error
+        let bounds = self.history.errors.each_ref();
+        let [lower, upper] = bounds.map(|error| (error + &self.history.last_error).abs());
+        lower.sup(&upper)
     }
 
     /// Twice the error of the planned Euler step, at the nodes, by the trapezoidal rule:
@@ -128,19 +124,14 @@ impl StepController<'_> {
         Ok(change)
     }
 
-    /// At the node of minimum `zeta`: the `errors` of ζ, and ζ′ in this step (`rate`) and in the one before, 1/s. Collective.
-    pub(super) fn at_weakest_node(
-        &self,
-        zeta: &DVector<f64>,
-        rate: &DVector<f64>,
-        errors: [&DVector<f64>; 2],
-    ) -> [f64; 4] {
+    /// At the node of minimum `zeta`: its error bar, and ζ′ in this step (`rate`) and in the one before, 1/s. Collective.
+    pub(super) fn at_weakest_node(&self, zeta: &DVector<f64>, rate: &DVector<f64>) -> [f64; 3] {
         let partition = &self.problem.body.vertices.partition;
         let weakest = (0..partition.owned()).min_by(|&a, &b| zeta[a].total_cmp(&zeta[b]));
         let (_, rank) = partition.comm().min_with_rank(weakest.map_or(f64::INFINITY, |i| zeta[i]));
         let before = self.history.rate.as_ref().unwrap_or(rate);
-        let fields = [errors[0], errors[1], rate, before];
-        let values = weakest.map_or([0.0; 4], |i| fields.map(|of| of[i]));
+        let bar = self.step_bar();
+        let values = weakest.map_or([0.0; 3], |i| [bar[i], rate[i], before[i]]);
         values.map(|value| partition.comm().broadcast(rank, value))
     }
 }

@@ -70,7 +70,7 @@ pub(super) fn is_complete(bytes: &[u8]) -> bool {
     Section::split(bytes, &mut sections).is_ok() && !sections.is_empty()
 }
 
-/// What follows this start of a comment, such as the version of gmsh in `gmsh 4.8.4`.
+/// The words after this start of a comment, such as the version of gmsh in `gmsh 4.8.4`.
 fn comment(section: &Section, start: &str) -> Option<String> {
     let line = ByteReader::new(section, Encoding::default()).line("a comment").ok()?;
     line.strip_prefix(start).map(str::to_owned)

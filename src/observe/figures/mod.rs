@@ -180,7 +180,7 @@ struct PartOfBoundary<'a> {
 }
 
 /// The kinds of the figures of a first contact: its time, and the components of the resultant of all loads then.
-pub(crate) const FIRST_CONTACT: [&str; 3] =
+pub const FIRST_CONTACT: [&str; 3] =
     ["first_contact", "load_x_at_first_contact", "load_y_at_first_contact"];
 
 /// The figures of a problem.

@@ -70,7 +70,7 @@ const OPERATORS: [(&str, Instruction, u8, u8); 13] = [
     ("/", Binary(|a, b| a / b, interval::quotient, Rule::Quotient), 5, 6),
     ("^", Binary(f64::powf, interval::power, Rule::Power), 6, 6),
 ];
-/// What may follow a number, in messages.
+/// The tokens that may follow a number, in messages.
 const AN_OPERATOR: &str = "a decimal point, an operator (`*`, `^`, `==`, `and`, `or`, …)";
 /// The precedence of a sign. Only `^` has a higher one: `-x^2` is −(x²), and `2^-1` is ½.
 const SIGN: u8 = 6;
