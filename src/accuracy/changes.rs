@@ -1,24 +1,19 @@
 //! The changes of the damage and of u between a mesh and a finer one.
 
-use super::{
-    Answer, FewStepRun,
-    sizes::{areas, touching},
-};
+use super::{Answer, FewStepRun, sizes::areas};
 use crate::{
     ROUNDING,
     estimate::mass,
     fem::quadratic_values,
     mesh::{Mesh, Refinement},
-    observe::{Dimension, Figure, ObservedProblem, Of},
-    scene::Probe,
 };
 use nalgebra::{Matrix6x3, Vector3};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 /// Per triangle of the mesh that was bisected to `finer`: its share in the squared change ‖ζ_h − ζ_{h/2}‖² / ‖1 − ζ_{h/2}‖² at
-/// the end; max |ζ_h − ζ_{h/2}|; and the least value of both. ζ_h is the answer on the bisected mesh, or on a refinement of it: on an
-/// edge that this one does not halve, it is affine.
-pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec<f64>; 3] {
+/// the end, and max |ζ_h − ζ_{h/2}|. ζ_h is the answer on the bisected mesh, or on a refinement of it: on an edge that this one does
+/// not halve, it is affine.
+pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec<f64>; 2] {
     let place = |node: &[f64; 2]| node.map(f64::to_bits);
     let known: HashMap<_, _> = coarse.mesh.nodes.iter().map(place).zip(&coarse.zeta).collect();
     let old = finer.mesh.nodes.len() - finer.halved_edges.len();
@@ -28,8 +23,7 @@ pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec
         before.push(known.get(&place(node)).map_or(middle, |zeta| **zeta));
     }
     let triangles = finer.parent_of_triangle.iter().max().map_or(0, |last| last + 1);
-    let [mut shares, mut largest, mut least] =
-        [0.0, 0.0, f64::INFINITY].map(|of| vec![of; triangles]);
+    let (mut shares, mut largest) = (vec![0.0; triangles], vec![0.0_f64; triangles]);
     let mut done = 0.0;
     let parts = finer.mesh.triangles.iter().zip(&finer.parent_of_triangle).zip(areas(&finer.mesh));
     for ((nodes, &parent), area) in parts {
@@ -40,68 +34,26 @@ pub(super) fn damage(coarse: &Answer, finer: &Refinement, fine: &Answer) -> [Vec
             shares[parent] += area * change * change;
             done += area * (1.0 - fine.zeta[node]).powi(2);
             largest[parent] = largest[parent].max(change.abs());
-            least[parent] = least[parent].min(before[node]).min(fine.zeta[node]);
         }
     }
     shares.iter_mut().for_each(|share| *share = if *share == 0.0 { 0.0 } else { *share / done });
-    [shares, largest, least]
+    [shares, largest]
 }
 
-/// For each figure that is a value of ζ: the maximum change of ζ in the triangles of `mesh` on which the figure depends, 0 in the others.
-/// For a probe they touch it. The minimum of ζ_h at x and that of ζ_{h/2} at y obey
-///
-/// −|ζ_h − ζ_{h/2}|(y) ≤ min ζ_{h/2} − min ζ_h ≤ |ζ_h − ζ_{h/2}|(x).
-///
-/// A triangle counts for it if its least ζ would be the minimum after another such change.
-pub(super) fn of_zeta(
-    problem: &ObservedProblem,
-    mesh: &Mesh,
-    [_, changes, least]: &[Vec<f64>; 3],
-) -> BTreeMap<String, Vec<f64>> {
-    let minimum = least.iter().copied().fold(f64::INFINITY, f64::min);
-    let changes_of = |figure: &Figure| {
-        let counts: Vec<bool> = match probe_of(problem, figure) {
-            Some(point) => touching(mesh, &[point]),
-            None => least.iter().zip(changes).map(|(of, change)| of - change <= minimum).collect(),
-        };
-        let counted = changes.iter().zip(counts);
-        let counted = counted.map(|(change, counts)| if counts { *change } else { 0.0 });
-        (figure.name.clone(), counted.collect())
-    };
-    let figures = problem.figures.iter().filter(|of| of.dimension == Dimension::Zeta);
-    figures.map(changes_of).collect()
-}
-
-/// The place of the probe that a figure describes, m, if it does.
-pub(super) fn probe_of(problem: &ObservedProblem, figure: &Figure) -> Option<[f64; 2]> {
-    let at = |probe: &Probe| (figure.of == Of::Probe(probe.name.clone())).then_some(probe.point);
-    problem.scene().probes.iter().find_map(at)
-}
-
-/// How much ζ changes at the node of its minimum, or at those of the triangles at a probe, if the lumped mass takes the place of the
-/// consistent one. With the triangles T = ijk at a node i,
+/// The change of ζ at the node of its minimum if the lumped mass takes the place of the consistent one, which overshoots at a jump of ζ.
+/// With the triangles T = ijk at the node i,
 ///
 /// |(M_L⁻¹Mζ)_i − ζ_i| = |Σ_T |T| (ζ_j + ζ_k − 2ζ_i)| / (4 Σ_T |T|).
-///
-/// Where the consistent mass overshoots at a jump, it is the overshoot. At a smooth minimum it is about h²Δζ/8, and the minimum between
-/// the nodes is not farther below that at a node.
-pub(super) fn roughness(answer: &Answer, probe: Option<[f64; 2]>) -> f64 {
-    let Answer { mesh, zeta, .. } = answer;
-    let mut sums = vec![[0.0; 2]; zeta.len()];
-    for (&[a, b, c], area) in mesh.triangles.iter().zip(areas(mesh)) {
-        for [i, j, k] in [[a, b, c], [b, c, a], [c, a, b]] {
-            sums[i][0] += area * (zeta[j] + zeta[k] - 2.0 * zeta[i]);
-            sums[i][1] += 4.0 * area;
+pub(super) fn overshoot(Answer { mesh, zeta, .. }: &Answer) -> f64 {
+    let weakest = (0..zeta.len()).min_by(|i, k| zeta[*i].total_cmp(&zeta[*k]));
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (nodes, area) in mesh.triangles.iter().zip(areas(mesh)) {
+        if let Some(i) = weakest.filter(|i| nodes.contains(i)) {
+            sum += area * nodes.iter().map(|&k| zeta[k] - zeta[i]).sum::<f64>();
+            weight += 4.0 * area;
         }
     }
-    let nodes: Vec<usize> = match probe {
-        Some(point) => {
-            let here = mesh.triangles.iter().zip(touching(mesh, &[point]));
-            here.filter(|(_, touches)| *touches).flat_map(|(nodes, _)| *nodes).collect()
-        }
-        None => (0..zeta.len()).min_by(|i, k| zeta[*i].total_cmp(&zeta[*k])).into_iter().collect(),
-    };
-    nodes.into_iter().map(|i| (sums[i][0] / sums[i][1]).abs()).fold(0.0, f64::max)
+    (sum / weight).abs()
 }
 
 /// ‖u_h − u_{h/2}‖ / ‖u_{h/2}‖ at the end in the energy norm, with u_h on the `mesh` that was bisected to `finer`. Collective.

@@ -8,7 +8,7 @@
 
 use super::{
     AccuracyLoop, AdaptError, Answer, End, Extreme, FEW, FewStepRun, Measured,
-    changes::{damage, displacement, of_zeta, probe_of, roughness},
+    changes::{damage, displacement, overshoot},
     problem_on,
     sequence::Sequence,
 };
@@ -18,7 +18,7 @@ use crate::{
     observe::{Dimension, Figure, ObservedProblem, Of},
     scene::{Probe, is_required},
 };
-use std::{collections::BTreeMap, slice::from_ref};
+use std::slice::from_ref;
 
 /// The fraction of the accuracy of a figure, or of u, that the mesh may use; the time steps use the rest.
 ///
@@ -55,7 +55,7 @@ pub(super) enum Cause {
     Ends,
     /// The error of ζ everywhere: the shares of the triangles in its square.
     Damage(Vec<f64>),
-    /// The triangles on which a value of ζ depends: the maximum change of ζ in each, 0 in the others.
+    /// Triangles in which ζ changes: the maximum change in each triangle.
     Change(Vec<f64>),
     /// The triangles at the ends of contact and at singular points.
     Reactions,
@@ -83,10 +83,9 @@ pub(super) struct Measurement {
     /// the maximum penetration at their edges, m.
     pub(super) shares: Vec<f64>,
     pub(super) depths: Vec<f64>,
-    /// Per triangle: its share of the squared error of ζ; empty without damage.
+    /// Per triangle: its share of the squared error of ζ, and max |Δζ|; empty without damage.
     of_damage: Vec<f64>,
-    /// By the name of a value of ζ, and per triangle: the change on which it depends, see [`of_zeta`]; empty without damage.
-    zeta: BTreeMap<String, Vec<f64>>,
+    zeta: Vec<f64>,
     /// The extremes of stresses and pressures on the bisected mesh, and the stresses at probes that have no value.
     of_points: Vec<Extreme>,
     at_probes: Vec<Extreme>,
@@ -159,11 +158,11 @@ impl Measurement {
         let mut measured = Self { displacement, ..Self::default() };
         measured.result.displacement = at_end;
         if coarse.problem.damage().is_some() {
-            let changes = damage(answer, finer, fine);
+            let [shares, largest] = damage(answer, finer, fine);
             // The finer mesh has an error, too: about r times that of the mesh before.
-            let before_it = sequence.rate() * self.result.damage.unwrap_or(0.0);
-            measured.result.damage = Some(changes[0].iter().sum::<f64>().sqrt() + before_it);
-            measured.zeta = of_zeta(coarse.problem, &before.last()?.mesh, &changes);
+            let before = sequence.rate() * self.result.damage.unwrap_or(0.0);
+            measured.result.damage = Some(shares.iter().sum::<f64>().sqrt() + before);
+            measured.zeta = largest;
         }
         measured.result.not_converged = self.result.not_converged.clone();
         measured.set_bars_of_settled(&sequence, coarse);
@@ -200,11 +199,11 @@ impl Measurement {
         measured.result.displacement = at_end;
         measured.displacement = measured.displacement.max(at_end);
         if problem.damage().is_some() {
-            let changes = damage(answer, finer, finer_answer);
+            let [shares, largest] = damage(answer, finer, finer_answer);
             let square = (1.0 - sequence.rate()).powi(-2);
-            measured.of_damage = changes[0].iter().map(|share| square * share).collect();
+            measured.of_damage = shares.iter().map(|share| square * share).collect();
             measured.result.damage = Some(measured.of_damage.iter().sum::<f64>().sqrt());
-            measured.zeta = of_zeta(problem, &answer.mesh, &changes);
+            measured.zeta = largest;
         }
         let points = problem.singular_points();
         measured.of_points = fine.extremes.named(&points);
@@ -235,13 +234,11 @@ impl Measurement {
     /// Sets the bars of the figures that converge over the meshes. Collective.
     fn set_bars_of_settled(&mut self, sequence: &Sequence, coarse: &FewStepRun) {
         let problem = coarse.problem;
+        let overshoots = coarse.outcome.bound_violation.first.is_some();
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
-            Dimension::Zeta => {
-                let near = self.zeta.get(&figure.name).into_iter().flatten();
-                // The change of the figure alone may be small by chance.
-                let least = roughness(sequence.answer(), probe_of(problem, figure));
-                near.copied().fold(sequence.error(i, false).max(least), f64::max)
+            Dimension::Zeta if figure.of == Of::Body && overshoots => {
+                sequence.error(i, false).max(overshoot(sequence.answer()))
             }
             dimension => {
                 let extreme = coarse.extremes.all.iter().find(|of| of.number == i);
@@ -309,9 +306,7 @@ impl Measurement {
         let of_probe = || problem.scene().probes.iter().find(is_at).map(|probe| probe.point);
         match (bar.dimension, of_extreme.or_else(of_probe)) {
             (Dimension::ContactLength, _) => Cause::Ends,
-            (Dimension::Zeta, _) => {
-                self.zeta.get(name).cloned().map_or(Cause::FIGURE, Cause::Change)
-            }
+            (Dimension::Zeta, _) => Cause::Change(self.zeta.clone()),
             (Dimension::Force | Dimension::Moment, _) => Cause::Reactions,
             (Dimension::Length, Some(at)) => Cause::Around(at, 0),
             (Dimension::Stress, Some(at)) => Cause::Around(at, 1),

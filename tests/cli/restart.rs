@@ -71,9 +71,7 @@ fn another_name_of_a_file_that_goes_on() {
 /// at ζ_* by the error of the steps, and the third one stops in both runs.
 #[test]
 fn a_repetition_with_shorter_steps_goes_on_as_if_it_had_not_been_interrupted() {
-    for (damage, top, accuracy) in [
-        ("lambda_u = 800", "traction = [0, '60*t']", "0.001"),
-    ] {
+    for (damage, top, accuracy) in [("lambda_u = 800", "traction = [0, '60*t']", "0.001")] {
         let directory = TestDirectory::new();
         let damage = format!("diffusion = 1e-3, lambda_d = 0, {damage}");
         write_bar(&directory, 1000.0, &damage, top);
