@@ -71,9 +71,9 @@ fn another_name_of_a_file_that_goes_on() {
 #[test]
 fn a_repetition_with_shorter_steps_goes_on_as_if_it_had_not_been_interrupted() {
     let directory = TestDirectory::new();
-    let damage = "diffusion = 1e-3, lambda_d = 0, lambda_u = 800";
-    write_bar(&directory, 1000.0, damage, "traction = [0, '60*t']");
-    let arguments = [&["--accuracy", "0.001"], &OFTEN[..]].concat();
+    let damage = "diffusion = 1e-3, lambda_d = 0, lambda_u = 300";
+    write_bar(&directory, 1000.0, damage, "traction = [0, '60*sin(20*t)']");
+    let arguments = [&["--accuracy", "0.1"], &OFTEN[..]].concat();
     let said = directory.run(&[&arguments[..], &["--out", "whole"]].concat());
     assert!(said.out.contains("again "), "{}", said.out);
     let said = fs::File::create(directory.path("said")).expect("mine");

@@ -2,12 +2,13 @@
 //!
 //! The error e of ζ̃ obeys e′ − κΔe = φ(û, ζ + e) − φ(u, ζ) between the steps, where ζ + e is exact and û belongs to it; each step
 //! adds its own error. Two fields with this equation bound e from below and above: they take the errors of the steps minus and
-//! plus the doubts about them. Their sources are integrated by the trapezoidal rule:
+//! plus the doubts about them. Their sources are integrated by Heun's method, whose prediction diffuses as well: a step without its
+//! diffusion is unstable at a singular point.
 //!
-//! e_n = D (e_{n−1} + ½ k (δφ_{n−1} + δφ_n) + error of the step),
+//! e* = D (e_{n−1} + k δφ_{n−1} + error of the step),
+//! e_n = D (e_{n−1} + ½ k (δφ_{n−1} + δφ(e*)) + error of the step),
 //!
-//! where D is the diffusion of one step, and δφ_n is taken at the e_n that the last two errors extrapolate: before it diffuses, the
-//! error of a step may be far too large at a singular point.
+//! where D is the diffusion of one step.
 //!
 //! The strains of û are not solved for. In a bar under one force, of parts in series, they are known: ε̂ = r ε with
 //! r = ζ/(ζ + e), or if its ends are prescribed, ε̂ = r/⟨r⟩ ε with the mean ⟨r⟩ by the strain energy. In other bodies ∫ζ ε:𝒜 dε is
@@ -72,10 +73,10 @@ impl StepController<'_> {
         damage_step: &mut DamageStep,
     ) -> Result<bool, RunError> {
         let (threshold, mut reached) = (self.problem.threshold(), false);
-        let omega = planned.length / self.history.length;
         for (i, error) in errors.into_iter().enumerate() {
             let (earlier, rate) = (&self.history.errors[i], &self.history.error_rates[i]);
-            let predicted = earlier + omega * &self.history.error_changes[i];
+            let mut predicted = earlier + planned.length * rate + &error;
+            damage_step.diffuse(planned, &mut predicted)?;
             let after = self.source_change(zeta, source, &(predicted + correction))?;
             let mut error = earlier + 0.5 * planned.length * (rate + after) + error;
             damage_step.diffuse(planned, &mut error)?;
@@ -86,7 +87,6 @@ impl StepController<'_> {
             let error = error.sup(&most);
             self.history.error_rates[i] =
                 self.source_change(zeta, source, &(&error + correction))?;
-            self.history.error_changes[i] = &error - &self.history.errors[i];
             self.history.errors[i] = error;
         }
         Ok(reached)
