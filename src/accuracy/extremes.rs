@@ -14,6 +14,9 @@ use crate::{
 };
 use rustc_hash::FxHashSet as HashSet;
 
+/// Why a stress at a corner has no value.
+pub const BY_DIRECTION: &str = "it depends on the direction there";
+
 /// An extreme of a state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Extreme {
@@ -194,14 +197,13 @@ impl<'a> Extremes<'a> {
             let singular =
                 points.iter().find(|of| is_here(&of.at) && !(of.is_open && presses(of.at)));
             let by_direction = self.directions.iter().any(is_here);
-            let reason = "it depends on the direction there".to_owned();
             (figure.dimension == Dimension::Stress && (singular.is_some() || by_direction)).then(
                 || Extreme {
                     number,
                     name: figure.name.clone(),
                     at,
                     singular: singular.map(|point| point.name.clone()),
-                    unresolved: singular.is_none().then_some(reason),
+                    unresolved: singular.is_none().then(|| BY_DIRECTION.to_owned()),
                     growth: 0.0,
                 },
             )
@@ -214,11 +216,7 @@ impl<'a> Extremes<'a> {
     fn unresolved_lengths(&self, state: &State) -> Vec<Extreme> {
         let penetrates = self.problem.penetration_note(&[state]).is_some();
         let unresolved = |(number, figure): (usize, &Figure)| {
-            let rows = match &figure.of {
-                Of::Boundary(name) => rows_of(&self.rows, name),
-                _ => &self.rows,
-            };
-            let is_resolved = self.problem.supports.contact.resolves_length(rows);
+            let is_resolved = self.problem.supports.contact.resolves_length(self.rows_of(figure));
             let reason = "contact of few nodes".to_owned();
             (!is_resolved.unwrap_or(!penetrates)).then(|| Extreme {
                 number,
@@ -232,6 +230,27 @@ impl<'a> Extremes<'a> {
         let lengths = self.problem.figures.iter().enumerate();
         let lengths = lengths.filter(|(_, of)| of.dimension == Dimension::ContactLength);
         lengths.filter_map(unresolved).collect()
+    }
+
+    /// The rows of Γ_C of a figure of contact.
+    fn rows_of(&self, figure: &Figure) -> &[ContactRow] {
+        match &figure.of {
+            Of::Boundary(name) => rows_of(&self.rows, name),
+            _ => &self.rows,
+        }
+    }
+
+    /// The part of a length of contact, m, on which the pressure is below its `error`, Pa: there the body may be apart from the
+    /// obstacle.
+    pub(super) fn faint_length(&self, figure: &Figure, error: f64) -> f64 {
+        let is_faint = |row: &ContactRow| row.active == 1 && row.pressure < error;
+        let length = |edge: &[ContactRow]| {
+            let [a, b] = edge else { return 0.0 };
+            let is_edge = (&a.boundary, a.part) == (&b.boundary, b.part);
+            let counts = is_edge && is_faint(a) && is_faint(b);
+            if counts { b.arc_length - a.arc_length } else { 0.0 }
+        };
+        self.rows_of(figure).windows(2).map(length).sum()
     }
 
     /// The extremes with the names of the singular `points` near which they are. Collective.

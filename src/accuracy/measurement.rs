@@ -251,8 +251,14 @@ impl Measurement {
         let Measured { bars, not_converged, .. } = &mut self.result;
         let infinite = coarse.extremes.all.iter().filter(|of| of.growth.is_infinite());
         not_converged.extend(infinite.map(|of| of.name.clone()));
-        *bars = problem.bars(&errors, &coarse.scales(not_converged));
-        bars.retain(|bar| !not_converged.contains(&bar.name));
+        *bars = problem.bars(&errors, &coarse.scales(not_converged), not_converged);
+        for figure in problem.figures.iter().filter(|of| of.dimension == Dimension::ContactLength) {
+            let bar_of = |name: &str| bars.iter().position(|bar| bar.name == name);
+            let pressure = bar_of(&figure.name.replace(figure.kind, "pressure_max"));
+            if let (Some(length), Some(pressure)) = (bar_of(&figure.name), pressure) {
+                bars[length].bar += coarse.extremes.faint_length(figure, bars[pressure].bar);
+            }
+        }
         problem.join_bars(bars, &coarse.outcome.last.figures);
     }
 

@@ -46,7 +46,7 @@ use crate::{
 pub use answer::INSTANTS;
 use answer::{Answer, FEW, FewStepRun};
 pub use conclusion::notes_on_extremes;
-pub use extremes::{Extreme, Extremes};
+pub use extremes::{BY_DIRECTION, Extreme, Extremes};
 pub use first_mesh::first_mesh;
 use limits::Limits;
 use marking::Estimate;

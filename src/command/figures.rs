@@ -3,7 +3,7 @@
 use super::task::Task;
 use serde::Serialize;
 use signorini::{
-    accuracy::Extreme,
+    accuracy::{BY_DIRECTION, Extreme},
     evolution::{GoverningValue, Outcome, Step},
     mesh::Mesh,
     observe::{Dimension, Figure, Of},
@@ -35,6 +35,7 @@ impl LastFigure<'_> {
     fn reason(&self) -> &'static str {
         match (&self.singular, &self.unresolved) {
             (Some(_), _) => ": singular",
+            (None, Some(reason)) if reason == BY_DIRECTION => ": depends on the direction there",
             (None, Some(_)) => ": not resolved",
             (None, None) => "",
         }

@@ -188,8 +188,9 @@ impl SceneArguments {
         let notes = Vec::from_iter(unused.map(|set| {
             format!("--set {set} has no effect: the accuracy chooses the mesh and the time steps")
         }));
-        if let Some(file) = &self.mesh {
-            scene.mesh = MeshSource::from_path(file);
+        match &self.mesh {
+            Some(file) => scene.mesh = MeshSource::from_path(file),
+            None => scene.check_mesh_file().map_err(Failure::input)?,
         }
         Ok((scene, notes))
     }

@@ -1,6 +1,7 @@
 //! Checks of a scene that need the mesh: names, and values at the nodes.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 
 use super::boundary::{Boundary, contradiction};
 use super::document::{NOWHERE, Problem};
@@ -117,6 +118,18 @@ impl Scene {
             self.at_key("accuracy_of", &format!("names `{name}`, which is no figure{suggestion}"))
         };
         self.text.refuse(unknown.map(problem).collect())
+    }
+
+    /// Checks that the file of the mesh can be read.
+    ///
+    /// # Errors
+    /// It cannot, with its line.
+    pub fn check_mesh_file(&self) -> Result<(), SceneError> {
+        let file = &self.mesh.file;
+        let problem = fs::metadata(file).err().map(|error| {
+            self.at_key("mesh.file", &format!("cannot be read: {}: {error}", file.display()))
+        });
+        self.text.refuse(problem.into_iter().collect())
     }
 
     fn bad_values(&self, mesh: &Mesh, times: &[f64]) -> Vec<Problem> {

@@ -34,8 +34,8 @@ fn changed(old: &str, new: &str) -> TestDirectory {
 const SCENES: &[(&str, &str, &[&str])] = &[
     ("young", "yuong", &["scene.toml:5: unknown key material.yuong", "did you mean `young`?"]),
     ("\"-3*t\"", "\"table('load.csv')\"", &["scene.toml:29: ", "load.csv: No such file"]),
-    ("square.msh", "none.msh", &["none.msh: No such file"]),
-    ("square.msh", "none.geo", &["none.geo: No such file"]),
+    ("square.msh", "none.msh", &["scene.toml:", "none.msh: No such file"]),
+    ("square.msh", "none.geo", &["scene.toml:", "none.geo: No such file"]),
     ("name = \"top\"", "name = \"toop\"", &["scene.toml:28: ", "no physical curve", "`top`"]),
     ("gap = \"0\"", "gap = \"1/(t-0.5)\"", &["scene.toml:26: ", "gap is inf at (", "t = 0.5"]),
     (

@@ -348,3 +348,30 @@ fn the_bar_of_the_least_zeta_contains_the_overshoot_at_a_jump() {
         }
     }
 }
+
+/// A manufactured field: p = 40 (¼ − x²) up to x = ½, beside which the gap opens like 2e-5 (x − ½)² and the side is pulled by 40 (x² − ¼).
+/// On meshes of linear elements small pressures go on far into the gap.
+#[test]
+fn the_bar_of_a_length_of_contact_contains_faint_contact() {
+    for (order, sizes) in [(1, [6, 8, 12]), (2, [4, 6, 8])] {
+        let scene = scene(&format!(
+            "discretisation.displacement = {order}
+             material = {{ young = 2e4, poisson = 0.3, plane = 'strain' }}
+             boundary = [
+                {{ name = 'bottom', gap = '2e-5*max(0, x - 0.5)^2 - 3.64e-4*x^2',
+                   traction = ['0', '-max(0, 40*(x^2 - 0.25))'] }},
+                {{ name = 'right', traction = ['40*x^2 - 120*y^2 - 16*y - 10', '-80*x*y'] }},
+                {{ name = 'top', traction = ['-80*x*y', '40*x^2 + 40*y^2 - 10'] }},
+                {{ name = 'left', displacement = ['0', '1.04e-3/0.75*y^3 + 1.56e-4*y^2 - 2.6e-4*y'] }},
+             ]"
+        ));
+        for n in sizes {
+            let (problem, outcome) = with_bars(&scene, n);
+            let found = outcome.last.figures[problem.figures.number("contact_length").unwrap()];
+            let (error, bar) = ((found.value - 0.5).abs(), bar(&outcome.bars, "contact_length"));
+            println!("order {order}, n = {n}: {} ± {bar:.3}", found.value);
+            assert!(error <= bar, "order {order}, n = {n}: {} ± {bar}", found.value);
+            assert!(order == 1 || bar < 0.3, "order {order}, n = {n}: ± {bar}");
+        }
+    }
+}
