@@ -5,7 +5,7 @@ use crate::{
     estimate::{RecoveredStrains, UNLOADED},
     evolution::{Outcome, RunError, RunOptions, Step, all_steps},
     mesh::Mesh,
-    observe::ObservedProblem,
+    observe::{ObservedProblem, Value},
     petsc::{PetscError, Session},
     problem::State,
 };
@@ -171,7 +171,9 @@ pub(super) struct Answer {
     /// The estimated relative error of u in the energy norm, η of [`Sequence`](super::sequence).
     pub(super) error: f64,
     /// The figures at the end.
-    pub(super) values: Vec<f64>,
+    pub(super) values: Vec<Value>,
+    /// The nodes of Γ_C, m, and the pressures there at the end, Pa.
+    pub(super) pressures: Vec<([f64; 2], f64)>,
     /// The length of the part of Γ_C on which the ends of contact may lie, m.
     pub(super) open: f64,
     /// The time of ζ_*, s.
@@ -191,7 +193,8 @@ impl Answer {
             zeta,
             times: run.history.times.clone(),
             error,
-            values: run.outcome.last.figures.iter().map(|of| of.value).collect(),
+            values: run.outcome.last.figures.clone(),
+            pressures: run.extremes.pressures(),
             open: run.open_length(),
             stop: run.stop(),
         }

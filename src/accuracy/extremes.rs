@@ -240,6 +240,11 @@ impl<'a> Extremes<'a> {
         }
     }
 
+    /// The nodes of Γ_C, m, and the pressures there, Pa.
+    pub(super) fn pressures(&self) -> Vec<([f64; 2], f64)> {
+        self.rows.iter().map(|row| ([row.x, row.y], row.pressure)).collect()
+    }
+
     /// The part of a length of contact, m, on which the pressure is below its `error`, Pa: there the body may be apart from the
     /// obstacle.
     pub(super) fn faint_length(&self, figure: &Figure, error: f64) -> f64 {

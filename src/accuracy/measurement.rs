@@ -238,12 +238,11 @@ impl Measurement {
         let error = |(i, figure): (usize, &Figure)| match figure.dimension {
             Dimension::ContactLength => sequence.error_of_length(i),
             Dimension::Zeta if figure.of == Of::Body && overshoots => {
-                sequence.error(i, false).max(overshoot(sequence.answer()))
+                sequence.error(i, figure).max(overshoot(sequence.answer()))
             }
-            dimension => {
+            _ => {
                 let extreme = coarse.extremes.all.iter().find(|of| of.number == i);
-                sequence.error(i, dimension == Dimension::Stress)
-                    + extreme.map_or(0.0, |of| of.growth)
+                sequence.error(i, figure) + extreme.map_or(0.0, |of| of.growth)
             }
         };
         let errors = Vec::from_iter(problem.figures.iter().enumerate().map(error));

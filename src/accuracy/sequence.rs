@@ -13,7 +13,10 @@
 //! the energy norm, hence ρ. The change between two meshes may vanish by chance, but hardly that from all meshes before.
 
 use super::{Answer, Extreme, sizes::size_at};
-use crate::advice::SEEN;
+use crate::{
+    advice::SEEN,
+    observe::{Dimension, Figure},
+};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// The safety factor of a bar, and the larger one of the bar of a stress: on 40 bodies of a user 10 % of the bars of
@@ -95,22 +98,27 @@ impl<'a> Sequence<'a> {
         safety * (largest + last * self.rate / (1.0 - self.rate))
     }
 
-    /// The bar of the figure `i`, which may be a stress.
-    pub(super) fn error(&self, i: usize, is_stress: bool) -> f64 {
-        self.bar(SAFETY[usize::from(is_stress)], |a, b| {
-            let [a, b] = [a, b].map(|of| of.values[i]);
-            match a.is_nan() || b.is_nan() {
-                false => (a - b).abs(),
-                // A first contact is missing on both meshes, or on one of them.
-                true if a.is_nan() == b.is_nan() => 0.0,
-                true => f64::INFINITY,
+    /// The bar of the `figure` of number `i`. The pressure changes where it is largest, too: along a line of equal pressures
+    /// the largest ones of two meshes may be equally wrong.
+    pub(super) fn error(&self, i: usize, figure: &Figure) -> f64 {
+        let safety = SAFETY[usize::from(figure.dimension == Dimension::Stress)];
+        self.bar(safety, |coarse, fine| {
+            let [a, b] = [coarse, fine].map(|of| of.values[i].value);
+            // A first contact is missing on both meshes, or on one of them.
+            if a.is_nan() || b.is_nan() {
+                return if a.is_nan() == b.is_nan() { 0.0 } else { f64::INFINITY };
             }
+            let there = fine.pressures.iter().filter(|(at, _)| Some(*at) == coarse.values[i].at);
+            let there = there.map(|(_, pressure)| *pressure).filter(|_| figure.is_pressure());
+            (a - b).abs().max(there.reduce(f64::max).map_or(0.0, |there| (a - there).abs()))
         })
     }
 
     /// The bar of the figure `i`, a length of contact. A change within the open parts is no error beyond them.
     pub(super) fn error_of_length(&self, i: usize) -> f64 {
-        let change = |a: &Answer, b: &Answer| (a.values[i] - b.values[i]).abs() - a.open - b.open;
+        let change = |a: &Answer, b: &Answer| {
+            (a.values[i].value - b.values[i].value).abs() - a.open - b.open
+        };
         SAFETY[0] * self.answers[self.answer].open
             + self.bar(SAFETY[0], |a, b| change(a, b).max(0.0))
     }
@@ -140,11 +148,11 @@ impl<'a> Sequence<'a> {
         let sizes = self.answers.iter().map(|answer| size_at(&answer.mesh, extreme.at));
         let (sizes, finest) = (Vec::from_iter(sizes), self.answers.len() - 1);
         let change = |from: usize, to: usize| {
-            let change = self.answers[to].values[i] - self.answers[from].values[i];
+            let change = self.answers[to].values[i].value - self.answers[from].values[i].value;
             change.abs() / (sizes[from] / sizes[to]).log2()
         };
         let last = change(finest - 1, finest);
-        if last <= SEEN * self.answers[finest].values[i].abs() {
+        if last <= SEEN * self.answers[finest].values[i].value.abs() {
             return true;
         }
         let first = if extreme.singular.is_some() { self.answer } else { 0 };
