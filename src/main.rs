@@ -38,7 +38,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Solve a scene; results go to out/<scene>/. On several cores: mpiexec -n 4 signorini run SCENE.
+    /// Solve a scene; results go to out/<scene>/. On several cores: --ranks auto.
     Run(command::RunArguments),
     /// Write NAME.geo and NAME.toml: a small geometry and scene, which run as they are, as a start.
     New {

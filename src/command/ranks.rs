@@ -1,11 +1,89 @@
-//! Failures on several ranks: all ranks end with one message and one exit code.
+//! Several ranks: how a run starts itself on them, and failures, at which all ranks end with one message and one exit code.
 
 use super::{Failure, tell};
 use signorini::{
     evolution::RunError,
     petsc::{Communicator, Session},
 };
-use std::{process, time::Duration};
+use std::{
+    convert::Infallible,
+    env,
+    num::NonZero,
+    os::unix::process::CommandExt,
+    process::{self, Command},
+    str::FromStr,
+    thread,
+    time::Duration,
+};
+
+/// The unknowns of the displacements from which r ranks pay are this number times r²: the dense Schur complement of the interface is
+/// shared. Two pay from 100,000, four from 400,000 (SPEED.md, section 2).
+const UNKNOWNS: f64 = 25_000.0;
+
+/// The argument of `--ranks`.
+#[derive(Debug, Clone, Copy)]
+pub enum Ranks {
+    /// As many as pay.
+    Auto,
+    /// This number.
+    Count(NonZero<usize>),
+}
+
+impl FromStr for Ranks {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            _ => text
+                .parse()
+                .map(Self::Count)
+                .map_err(|_| "it is neither a number from 1 on nor auto"),
+        }
+    }
+}
+
+/// The number of cores that this process may use, 1 if it is not known.
+pub fn cores() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get)
+}
+
+/// The number of ranks that pay for this number of unknowns of the displacements, at most one per core.
+pub fn paying(unknowns: usize) -> usize {
+    let ranks = (unknowns as f64 / UNKNOWNS).sqrt() as usize;
+    ranks.clamp(1, cores())
+}
+
+/// Replaces this process by the same command on this number of `ranks`, without its argument `--ranks`.
+pub fn start(ranks: usize) -> Result<Infallible, Failure> {
+    let (mut passed, mut arguments) = (Vec::new(), env::args_os().skip(1));
+    while let Some(argument) = arguments.next() {
+        if argument == "--" {
+            passed.push(argument);
+            passed.extend(arguments);
+            break;
+        } else if argument == "--ranks" {
+            arguments.next();
+        } else if !argument.as_encoded_bytes().starts_with(b"--ranks=") {
+            passed.push(argument);
+        }
+    }
+    let program =
+        env::current_exe().map_err(|error| Failure::input(format!("--ranks: {error}")))?;
+    let mut mpiexec = Command::new("mpiexec");
+    let error = mpiexec.arg("-n").arg(ranks.to_string()).arg(program).args(passed).exec();
+    Err(Failure::input(format!("--ranks: mpiexec cannot be started: {error}; install openmpi-bin")))
+}
+
+/// Checks that the ranks that a launcher started know each other.
+pub fn check_launcher(comm: Communicator) -> Result<(), Failure> {
+    match Communicator::launched() {
+        Some(ranks) if ranks > 1 && comm.is_serial() => Err(Failure::input(format!(
+            "{ranks} processes were started that do not know each other: this mpiexec belongs to another MPI than PETSc"
+        ))),
+        _ => Ok(()),
+    }
+}
 
 /// The time for which a failed rank waits for the others. If they know of the failure, they arrive at once.
 const PATIENCE: Duration = Duration::from_secs(10);

@@ -3,6 +3,7 @@
 use super::{
     checkpoint::{self, Checkpoint, Recorded},
     figures::LastFigures,
+    ranks::paying,
     screen,
     summary::summary,
     task::Task,
@@ -187,7 +188,11 @@ impl<'a> Recorder<'a> {
         }
         let shown = &notes[..warnings];
         let mut lines = screen::conclusion(task, record, figures.as_ref(), result, shown);
-        lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB")));
+        let partition = &task.problem.body.nodes.partition;
+        let ranks = paying(2 * partition.total());
+        let is_long = wall > 30.0 && ranks > 1 && partition.comm().is_serial();
+        let idle = if is_long { "; shorter on several cores: --ranks auto" } else { "" };
+        lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB{idle}")));
         progress.finish();
         say(&lines.join("\n"));
         written

@@ -5,7 +5,7 @@ use super::{
     check::contact_nodes,
     check_petsc,
     checkpoint::Checkpoint,
-    ranks::{agree, barrier_or_abort},
+    ranks::{self, Ranks, agree, barrier_or_abort, cores},
     read_mesh,
     recorder::Recorder,
     screen,
@@ -19,7 +19,7 @@ use signorini::{
     evolution::{Outcome, RunError},
     interrupt::Interrupts,
     linear::LinearSolver,
-    mesh::Mesh,
+    mesh::{Mesh, Order},
     observe::ObservedProblem,
     output::{self, terminal::say},
     petsc::{Communicator, Session, stage},
@@ -56,6 +56,9 @@ pub struct RunArguments {
     /// checkpoint start from the beginning.
     #[arg(long)]
     restart: bool,
+    /// Run on this number of processes, at most one per core, or on as many as pay: starts itself under mpiexec.
+    #[arg(long, value_name = "N|auto")]
+    ranks: Option<Ranks>,
     /// PETSc options, e.g. -- -tao_monitor -log_view.
     #[arg(last = true, value_name = "PETSC OPTIONS")]
     petsc: Vec<String>,
@@ -71,6 +74,9 @@ impl RunArguments {
                 "--out: the results cannot go into the root folder; choose another folder";
             return Err(Failure::input(problem));
         }
+        if self.ranks.is_some() && Communicator::launched().is_some() {
+            return Err(Failure::input("--ranks: mpiexec has started this run; leave --ranks out"));
+        }
         check_petsc(&self.petsc)
     }
 
@@ -79,6 +85,31 @@ impl RunArguments {
         let solver =
             self.solver.iter().map(|name| format!("contact.solver={}", toml::Value::from(&**name)));
         self.scene.read(&Vec::from_iter(solver))
+    }
+
+    /// The number of processes. Runs with an accuracy are many, on meshes for which one process is best.
+    fn count(&self, ranks: Ranks) -> Result<usize, Failure> {
+        match ranks {
+            Ranks::Count(number) if number.get() > cores() => Err(Failure::input(format!(
+                "--ranks {number}: this process may use {} cores, and more ranks than cores are slower",
+                cores()
+            ))),
+            Ranks::Count(number) => Ok(number.get()),
+            Ranks::Auto => {
+                let (scene, _) = self.read()?;
+                if scene.accuracy.is_some() {
+                    return Ok(1);
+                }
+                let mesh = read_mesh(&scene, false)?;
+                let (vertices, triangles) = (mesh.nodes.len(), mesh.triangles.len());
+                // V − E + T = 1 for a body without holes.
+                let nodes = match scene.order {
+                    Order::Linear => vertices,
+                    Order::Quadratic => 2 * vertices + triangles,
+                };
+                Ok(ranks::paying(2 * nodes))
+            }
+        }
     }
 
     /// The folder of the results.
@@ -127,8 +158,15 @@ fn check_mesh_is_kept(scene: &Scene, folder: &Path) -> Result<(), Failure> {
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let checked = arguments.check();
+    if let (Some(ranks), Ok(())) = (arguments.ranks, &checked) {
+        let ranks = arguments.count(ranks)?;
+        if ranks > 1 {
+            match ranks::start(ranks)? {}
+        }
+    }
     let options = if checked.is_ok() { &arguments.petsc[..] } else { &[] };
     let session = stage("petsc start", || Session::start(options))?;
+    let checked = checked.and_then(|()| ranks::check_launcher(session.comm()));
     let task = agree(session.comm(), checked).and_then(|()| read(arguments, &session, started));
     let warns = task.is_ok() && session.comm().is_root();
     let result = task.and_then(|(task, restart)| solve(task, restart, &session));

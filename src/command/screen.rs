@@ -12,13 +12,10 @@ use signorini::{
     problem::Collapse,
     scene::{Scene, Scheme, Stepping, TimeGrid, rounded},
 };
-use std::{num::NonZero, thread, time::Instant};
+use std::time::Instant;
 
 /// The length of the progress bar: it counts parts of [0, T], as many as a run may have steps.
 const LENGTH: u64 = 1_000_000_000;
-
-/// The number of nodes from which two ranks pay: 100,000 unknowns of the displacements (SPEED.md, section 2).
-const MANY_NODES: usize = 50_000;
 
 /// Shows the task and a progress bar.
 pub fn open(task: &Task) -> Progress {
@@ -27,8 +24,6 @@ pub fn open(task: &Task) -> Progress {
     let ranks = partition.comm().size();
     if ranks > 1 {
         mesh += &format!(", on {ranks} ranks");
-    } else if partition.total() >= MANY_NODES && cores() > 1 {
-        mesh += ", on one core (two, 1.2 to 1.4 times as fast: mpiexec -n 2 signorini run …)";
     }
     let solver = scene.contact.solver_name();
     let solver = match task.contact_nodes {
@@ -43,11 +38,6 @@ pub fn open(task: &Task) -> Progress {
     let mut progress = Progress::new(LENGTH);
     progress.show(0, vec!["the first solve".to_owned()]);
     progress
-}
-
-/// The number of cores that this process may use, 1 if it is not known.
-fn cores() -> usize {
-    thread::available_parallelism().map_or(1, NonZero::get)
 }
 
 /// Shows the meshes of the accuracy loop.

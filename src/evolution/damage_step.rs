@@ -164,8 +164,8 @@ impl DamageStep<'_> {
         Ok(finite.then(|| DVector::from_vec(change)))
     }
 
-    /// Lets an error δ = `error` of ζ_{n−1} diffuse for a planned step of length k_n: δ becomes δ − (k_n/k)
-    /// (M + kκL)⁻¹ kκLδ. It is unchanged if the solve fails. Collective.
+    /// Lets an `error` δ of ζ diffuse in a planned step: δ becomes (M + kκL)⁻¹ Mδ = δ − (M + kκL)⁻¹ kκLδ. It is unchanged if the
+    /// solve fails. Collective.
     pub(crate) fn diffuse(
         &mut self,
         planned: &PlannedStep,
@@ -176,7 +176,7 @@ impl DamageStep<'_> {
         }
         let load = self.system(planned.k)?.diffusion_load(error.as_slice())?;
         if let Some(change) = self.correction(planned, &load)? {
-            *error += planned.length / planned.k * change;
+            *error += change;
         }
         Ok(())
     }

@@ -11,7 +11,7 @@ use signorini::{
     contact::SOLVERS,
     petsc::{Communicator, Session},
 };
-use std::{env, fs, path::Path, process::Command};
+use std::{env, fs, path::Path, process::Command, thread::available_parallelism};
 use test_directory::{ProgramOutput, TestDirectory, sets, signal, square, start, wait_until};
 
 /// Answers on several ranks may differ by this, relative to the largest value of a run.
@@ -22,17 +22,22 @@ pub fn on_ranks(test_directory: &TestDirectory, ranks: usize, arguments: &[&str]
     launched(test_directory, ranks, env!("CARGO_BIN_EXE_signorini"), arguments)
 }
 
-/// A program on `ranks` ranks, which exchange their messages through memory: Open MPI complains about some networks.
+/// A program on `ranks` ranks.
 fn launched(
     test_directory: &TestDirectory,
     ranks: usize,
     program: &str,
     arguments: &[&str],
 ) -> Command {
-    let mut command = Command::new("mpiexec");
+    let ranks = ranks.to_string();
+    let arguments = [&["-n", &ranks, "--oversubscribe", program], arguments].concat();
+    in_directory(test_directory, "mpiexec", &arguments)
+}
+
+/// A program whose ranks exchange their messages through memory: Open MPI complains about some networks.
+fn in_directory(test_directory: &TestDirectory, program: &str, arguments: &[&str]) -> Command {
+    let mut command = Command::new(program);
     command
-        .args(["-n", &ranks.to_string(), "--oversubscribe"])
-        .arg(program)
         .args(arguments)
         .current_dir(test_directory.path(""))
         .envs([("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")])
@@ -346,6 +351,29 @@ fn every_kind_of_factor_gives_the_same_answer() {
         assert!(!said.out.contains("in its place"), "another solver answered: {said:?}");
         same_history(&directory, kind, "one");
     }
+}
+
+#[test]
+fn a_run_starts_itself_on_several_ranks() {
+    let directory = TestDirectory::new();
+    let itself = |more: &[&str]| {
+        let arguments = [&["run", "scene.toml"], more].concat();
+        in_directory(&directory, env!("CARGO_BIN_EXE_signorini"), &arguments)
+    };
+    if available_parallelism().is_ok_and(|cores| cores.get() > 1) {
+        let said = ProgramOutput::of(&mut itself(&["--ranks=2", "--out", "itself"]));
+        assert!(said.code == Some(0) && said.out.contains("on 2 ranks"), "{said:?}");
+        assert_eq!(run_on_ranks(&directory, 2, &["--out", "mpiexec"]).code, Some(0));
+        assert!(directory.results("itself") == directory.results("mpiexec"));
+        one_message(&ProgramOutput::of(itself(&["--ranks", "2"]).env("PATH", "")), 2, "mpiexec");
+    }
+    // The mesh is small.
+    let said = ProgramOutput::of(&mut itself(&["--ranks", "auto"]));
+    assert!(said.code == Some(0) && !said.out.contains("ranks"), "{said:?}");
+    for (ranks, fragment) in [("0", "from 1 on"), ("many", "auto"), ("4096", "cores")] {
+        one_message(&ProgramOutput::of(&mut itself(&["--ranks", ranks])), 2, fragment);
+    }
+    one_message(&run_on_ranks(&directory, 2, &["--ranks", "2"]), 2, "leave --ranks out");
 }
 
 #[test]

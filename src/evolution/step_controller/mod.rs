@@ -65,8 +65,11 @@ pub(super) struct StepState {
     /// The damage source at t_{n−1}, and b_{n−1} − b_{n−2}, m²/s.
     source: SourceLoad,
     load_change: DVector<f64>,
-    /// The lower and the upper bound on the error of ζ̃ from the steps so far, and the changes of the source by them, 1/s.
+    /// The lower and the upper bound on the error of ζ̃ from the steps so far, and their changes in the last step, of which these are
+    /// its own errors; for Euler's steps the changes of the source by the bounds, 1/s.
     errors: [DVector<f64>; 2],
+    error_changes: [DVector<f64>; 2],
+    step_errors: [DVector<f64>; 2],
     error_rates: [DVector<f64>; 2],
     /// The times of the accepted steps, s, and min ζ then.
     path: Vec<[f64; 2]>,
@@ -109,6 +112,8 @@ impl<'a> StepController<'a> {
             source,
             load_change: zeros.clone(),
             errors: [zeros.clone(), zeros.clone()],
+            error_changes: [zeros.clone(), zeros.clone()],
+            step_errors: [zeros.clone(), zeros.clone()],
             error_rates: [zeros.clone(), zeros.clone()],
             path: Vec::new(),
             may_stop: None,

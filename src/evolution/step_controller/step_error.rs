@@ -2,13 +2,12 @@
 //!
 //! The error e of ζ̃ obeys e′ − κΔe = φ(û, ζ + e) − φ(u, ζ) between the steps, where ζ + e is exact and û belongs to it; each step
 //! adds its own error. Two fields with this equation bound e from below and above: they take the errors of the steps minus and
-//! plus the doubts about them. Their sources are integrated by Heun's method, whose prediction diffuses as well: a step without its
-//! diffusion is unstable at a singular point.
+//! plus the doubts about them, and otherwise make the steps of ζ̃ itself:
 //!
-//! e* = D (e_{n−1} + k δφ_{n−1} + error of the step),
-//! e_n = D (e_{n−1} + ½ k (δφ_{n−1} + δφ(e*)) + error of the step),
+//! (M + kκL) e_n = M (e_{n−1} + β (e_{n−1} − e_{n−2} − error of the step before) + k δφ_n + error of the step),
 //!
-//! where D is the diffusion of one step.
+//! where δφ_n is taken at the e_n that the last two errors extrapolate: before it diffuses, the error of a step may be far too large at
+//! a singular point. Euler's steps take the mean of δφ_{n−1} and δφ_n.
 //!
 //! The strains of û are not solved for. In a bar under one force, of parts in series, they are known: ε̂ = r ε with
 //! r = ζ/(ζ + e), or if its ends are prescribed, ε̂ = r/⟨r⟩ ε with the mean ⟨r⟩ by the strain energy. In other bodies ∫ζ ε:𝒜 dε is
@@ -73,20 +72,29 @@ impl StepController<'_> {
         damage_step: &mut DamageStep,
     ) -> Result<bool, RunError> {
         let (threshold, mut reached) = (self.problem.threshold(), false);
+        let omega = planned.length / self.history.length;
+        let beta = omega * omega / (1.0 + 2.0 * omega);
         for (i, error) in errors.into_iter().enumerate() {
             let (earlier, rate) = (&self.history.errors[i], &self.history.error_rates[i]);
-            let mut predicted = earlier + planned.length * rate + &error;
-            damage_step.diffuse(planned, &mut predicted)?;
+            let change = &self.history.error_changes[i];
+            let predicted = earlier + omega * change;
             let after = self.source_change(zeta, source, &(predicted + correction))?;
-            let mut error = earlier + 0.5 * planned.length * (rate + after) + error;
+            let (beta, of_source) =
+                if self.two_step { (beta, after) } else { (0.0, 0.5 * (rate + after)) };
+            let transported = change - &self.history.step_errors[i];
+            self.history.step_errors[i] = error.clone();
+            let mut error = earlier + beta * transported + planned.k * of_source + error;
             damage_step.diffuse(planned, &mut error)?;
             // A bound beyond ζ_* says no more.
             let most = -(zeta + correction).add_scalar(-threshold);
             let reaches = error.iter().zip(&most).any(|(error, most)| error <= most);
             reached |= self.problem.body.comm().any(reaches);
             let error = error.sup(&most);
-            self.history.error_rates[i] =
-                self.source_change(zeta, source, &(&error + correction))?;
+            if !self.two_step {
+                self.history.error_rates[i] =
+                    self.source_change(zeta, source, &(&error + correction))?;
+            }
+            self.history.error_changes[i] = &error - &self.history.errors[i];
             self.history.errors[i] = error;
         }
         Ok(reached)
