@@ -1,6 +1,6 @@
 //! SOLVE: a run with few time steps, the error of u and the penetration on each triangle, and the answer that stays.
 
-use super::Extremes;
+use super::{Extremes, extremes::points_of_ranks};
 use crate::{
     estimate::{RecoveredStrains, UNLOADED},
     evolution::{Outcome, RunError, RunOptions, Step, all_steps},
@@ -172,8 +172,8 @@ pub(super) struct Answer {
     pub(super) error: f64,
     /// The figures at the end.
     pub(super) values: Vec<Value>,
-    /// The nodes of Γ_C, m, and the pressures there at the end, Pa.
-    pub(super) pressures: Vec<([f64; 2], f64)>,
+    /// Per figure that is a largest value over points: these, m, and the sizes of the values there at the end.
+    pub(super) points: Vec<Vec<([f64; 2], f64)>>,
     /// The length of the part of Γ_C on which the ends of contact may lie, m.
     pub(super) open: f64,
     /// The time of ζ_*, s.
@@ -188,13 +188,22 @@ impl Answer {
         for (t, nodes) in mesh.triangles.iter().enumerate() {
             nodes.iter().zip(&of_triangles).for_each(|(&node, of)| zeta[node] = of[t]);
         }
+        let problem = run.problem;
+        let mut points =
+            Vec::from_iter(problem.figures.iter().enumerate().map(|(i, _)| run.extremes.points(i)));
+        if let Some(number) = problem.figures.number("displacement_max") {
+            let (nodes, u) = (&problem.body.nodes, &run.outcome.last.state.u);
+            let own = u.chunks_exact(2).zip(&nodes.points).take(nodes.partition.owned());
+            let own = own.map(|(u, &[x, y])| [x, y, u[0].hypot(u[1])]);
+            points[number] = points_of_ranks(problem.body.comm(), own);
+        }
         Self {
             mesh,
             zeta,
             times: run.history.times.clone(),
             error,
             values: run.outcome.last.figures.clone(),
-            pressures: run.extremes.pressures(),
+            points,
             open: run.open_length(),
             stop: run.stop(),
         }

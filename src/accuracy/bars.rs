@@ -65,6 +65,8 @@ impl Outcome {
     /// third order, so there are then about four times as many steps.
     pub fn shorter_steps(&self, problem: &ObservedProblem, measured: &Measured) -> Option<f64> {
         let accuracy = problem.scene().accuracy?;
+        // Only the errors of the damage add up over the steps.
+        problem.damage()?;
         let bars = measured.bars.iter().zip(&self.bars);
         let bars = bars.filter(|(bar, _)| problem.scene().requires_accuracy_of(&bar.name));
         let bars = bars.map(|(of_mesh, of_both)| [of_mesh.relative(), of_both.relative()]);

@@ -7,9 +7,10 @@ use crate::{
     mesh::{TIES, distance, extent},
     model::von_mises,
     observe::{
-        ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Rays, Value, rows_of,
+        ContactRow, Dimension, Figure, NodalStress, ObservedProblem, Of, Rays, Value, principal,
+        rows_of,
     },
-    petsc::PetscError,
+    petsc::{Communicator, PetscError},
     problem::State,
 };
 use rustc_hash::FxHashSet as HashSet;
@@ -240,9 +241,28 @@ impl<'a> Extremes<'a> {
         }
     }
 
-    /// The nodes of Γ_C, m, and the pressures there, Pa.
-    pub(super) fn pressures(&self) -> Vec<([f64; 2], f64)> {
-        self.rows.iter().map(|row| ([row.x, row.y], row.pressure)).collect()
+    /// The points at which the extreme of number `i` is looked for, m, and the sizes of the values there, Pa; none at corners with
+    /// directions, and none for other figures. Collective.
+    pub(super) fn points(&self, i: usize) -> Vec<([f64; 2], f64)> {
+        let figure = &self.problem.figures[i];
+        let size = |stress: [f64; 4]| match figure.kind {
+            "von_mises_max" => Some(von_mises(stress)),
+            "principal_max" => Some(principal(stress)[0]),
+            "principal_min" => Some(-principal(stress)[1]),
+            _ => None,
+        };
+        if !figure.is_extreme() || figure.is_away() {
+            return Vec::new();
+        }
+        if figure.is_pressure() {
+            return self.rows_of(figure).iter().map(|row| ([row.x, row.y], row.pressure)).collect();
+        }
+        let points = self.stresses.iter().zip(&self.problem.nodal_stress().points);
+        let points = points.filter(|(_, point)| {
+            self.is_in(figure, point.material) && !self.directions.contains(&point.at)
+        });
+        let own = points.filter_map(|(stress, of)| Some([of.at[0], of.at[1], size(*stress)?]));
+        points_of_ranks(self.problem.body.comm(), own)
     }
 
     /// The part of a length of contact, m, on which the pressure is below its `error`, Pa: there the body may be apart from the
@@ -307,4 +327,13 @@ impl<'a> Extremes<'a> {
         let own = there.map(|(stress, _)| von_mises(*stress)).fold(f64::NEG_INFINITY, f64::max);
         problem.body.comm().max(own)
     }
+}
+
+/// The places, m, and values of all ranks. Collective.
+pub(super) fn points_of_ranks(
+    comm: Communicator,
+    own: impl Iterator<Item = [f64; 3]>,
+) -> Vec<([f64; 2], f64)> {
+    let all = comm.gather(own.collect::<Vec<_>>().as_flattened());
+    all.chunks_exact(3).map(|of| ([of[0], of[1]], of[2])).collect()
 }

@@ -98,8 +98,8 @@ impl<'a> Sequence<'a> {
         safety * (largest + last * self.rate / (1.0 - self.rate))
     }
 
-    /// The bar of the `figure` of number `i`. The pressure changes where it is largest, too: along a line of equal pressures
-    /// the largest ones of two meshes may be equally wrong.
+    /// The bar of the `figure` of number `i`. A largest value changes where it is found, too: where many points have equal values, the
+    /// largest ones on two meshes may be equally wrong.
     pub(super) fn error(&self, i: usize, figure: &Figure) -> f64 {
         let safety = SAFETY[usize::from(figure.dimension == Dimension::Stress)];
         self.bar(safety, |coarse, fine| {
@@ -108,9 +108,9 @@ impl<'a> Sequence<'a> {
             if a.is_nan() || b.is_nan() {
                 return if a.is_nan() == b.is_nan() { 0.0 } else { f64::INFINITY };
             }
-            let there = fine.pressures.iter().filter(|(at, _)| Some(*at) == coarse.values[i].at);
-            let there = there.map(|(_, pressure)| *pressure).filter(|_| figure.is_pressure());
-            (a - b).abs().max(there.reduce(f64::max).map_or(0.0, |there| (a - there).abs()))
+            let there = fine.points[i].iter().filter(|(at, _)| Some(*at) == coarse.values[i].at);
+            let there = there.map(|(_, size)| (figure.size(a) - size).abs()).reduce(f64::min);
+            (a - b).abs().max(there.unwrap_or(0.0))
         })
     }
 
