@@ -261,10 +261,15 @@ impl Measurement {
         problem.join_bars(bars, &coarse.outcome.last.figures);
     }
 
-    /// Leaves out these figures, whose errors stay while the mesh becomes finer.
-    pub(super) fn leave_out(&mut self, names: &[String]) {
-        self.result.bars.retain(|bar| !names.contains(&bar.name));
-        self.result.not_converged.extend_from_slice(names);
+    /// Leaves out these figures of the run `coarse`, whose errors stay while the mesh becomes finer: they are no scale of others.
+    pub(super) fn leave_out(&mut self, names: &[String], coarse: &FewStepRun) {
+        let Measured { bars, not_converged, .. } = &mut self.result;
+        bars.retain(|bar| !names.contains(&bar.name));
+        not_converged.extend_from_slice(names);
+        let (figures, scales) = (&coarse.problem.figures, coarse.scales(not_converged));
+        for bar in bars {
+            bar.scale = figures.number(&bar.name).map_or(bar.scale, |i| scales[i]);
+        }
     }
 
     /// Why a figure in `names` has no accuracy, if one does not converge over the meshes.

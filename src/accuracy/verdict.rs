@@ -83,7 +83,7 @@ impl Progress {
         let stay = extremes.map(|of| &of.name).filter(|name| self.stays(name));
         let stay = Vec::from_iter(stay.cloned());
         self.not_converged.extend(stay);
-        measured.leave_out(&Vec::from_iter(self.not_converged.iter().cloned()));
+        measured.leave_out(&Vec::from_iter(self.not_converged.iter().cloned()), run);
         measured
     }
 

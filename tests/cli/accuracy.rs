@@ -262,8 +262,6 @@ fn error_bars_hold_on_curved_sides() {
          boundary = [{ name = 'axes', symmetry = true }, { name = 'bore', pressure = 1 }]",
     );
     let exact = (5.0 / 3.0 + 0.3) / 50.0;
-    // A bar holds in 97 % of all cases; here three of four hold, and no error is twice its bar.
-    let mut held = 0;
     // Linear displacements, too, on meshes that follow the circles: on the sides of the first mesh the work is 1.5 % off.
     let linear = &sets(&["discretisation.displacement=1"])[..];
     for (accuracy, more) in [(0.05, &[][..]), (0.01, &[]), (0.002, &[]), (0.05, linear)] {
@@ -271,12 +269,10 @@ fn error_bars_hold_on_curved_sides() {
         let summary = directory.summary("out/scene");
         let found = summary["figures"]["displacement_max"]["value"].as_f64().unwrap();
         let bar = summary["figures"]["displacement_max"]["bar"].as_f64().unwrap();
-        assert!((found - exact).abs() <= 2.0 * bar, "{accuracy}: {found} ± {bar}, not {exact}");
-        held += usize::from((found - exact).abs() <= bar);
+        assert!((found - exact).abs() <= bar, "{accuracy}: {found} ± {bar}, not {exact}");
         let work = summary["figures"]["work"]["value"].as_f64().unwrap() / (FRAC_PI_2 * exact);
         assert!((work - 1.0).abs() < accuracy * accuracy, "{accuracy}: {work} of the work");
     }
-    assert!(held >= 3, "{held} of 4 bars hold");
 }
 
 #[test]
