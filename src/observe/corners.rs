@@ -52,7 +52,7 @@ impl ObservedProblem {
     pub fn rays(&self, state: &State) -> Vec<Rays<'_>> {
         let corners = self.corners.get_or_init(|| {
             let new = |corner| LoadedCorner { corner, near: OnceLock::new() };
-            self.problem.corners().1.into_iter().map(new).collect()
+            self.problem.corners().1.iter().cloned().map(new).collect()
         });
         let active = state.of_contact().filter(|of| of.active);
         let active = Vec::from_iter(active.map(|of| self.body.nodes.points[of.node]));

@@ -43,7 +43,7 @@ use crate::{
 };
 use boundary_conditions::BoundaryConditions;
 use nalgebra::DVector;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::OnceLock};
 
 /// A scene on its mesh, ready for the time steps.
 #[derive(Debug)]
@@ -79,6 +79,8 @@ pub struct DiscreteProblem {
     pub collapse: Option<Collapse>,
     /// If `body` is a subdomain: the undivided mesh.
     undivided: Option<Mesh>,
+    /// See [`Self::corners`].
+    corners: OnceLock<(Vec<Singular>, Vec<Corner>)>,
 }
 
 /// The data of the contact problem (26) at one time.
@@ -145,6 +147,7 @@ impl DiscreteProblem {
             body,
             scene,
             undivided: None,
+            corners: OnceLock::new(),
             collapse: None,
         };
         problem.until_collapse()

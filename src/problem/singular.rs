@@ -171,11 +171,15 @@ fn wrapped(angle: f64) -> f64 {
 impl DiscreteProblem {
     /// The points of the whole body with singular stresses.
     pub fn singular_points(&self) -> Vec<Singular> {
-        self.corners().0
+        self.corners().0.clone()
     }
 
-    /// The points of the whole body with singular stresses, and its other corners.
-    pub(crate) fn corners(&self) -> (Vec<Singular>, Vec<Corner>) {
+    /// The points of the whole body with singular stresses, and its other corners, found once.
+    pub(crate) fn corners(&self) -> &(Vec<Singular>, Vec<Corner>) {
+        self.corners.get_or_init(|| self.found_corners())
+    }
+
+    fn found_corners(&self) -> (Vec<Singular>, Vec<Corner>) {
         let (wedges, supports) = (self.wedges(), self.supports_of_edges());
         let is_side = |edge: [usize; 2]| wedges.next.contains_key(&edge);
         let first = wedges.lines.ends.iter().flat_map(|(&node, ends)| {
