@@ -21,6 +21,7 @@ const MIN_SCALE: f64 = 1e-3;
 /// of the body, about √(E ‖u‖²/|Ω|): a stress at a free corner is zero. That of a displacement is at least this fraction of
 /// max |u|: at a support it is zero.
 const MIN_PART: f64 = 0.1;
+
 impl Outcome {
     /// Sets the error bars: the `measured` errors of the mesh plus the errors of the time steps. A run that stopped at
     /// ζ_* has the bar of this time alone, because another mesh stops at another time. There are none if the run has too
