@@ -164,20 +164,21 @@ impl DamageStep<'_> {
         Ok(finite.then(|| DVector::from_vec(change)))
     }
 
-    /// Lets an `error` δ of ζ diffuse in a planned step: δ becomes (M + kκL)⁻¹ Mδ = δ − (M + kκL)⁻¹ kκLδ. It is unchanged if the
-    /// solve fails. Collective.
+    /// Lets two `errors` δ of ζ diffuse in a planned step: δ becomes (M + kκL)⁻¹ Mδ. They are unchanged if a solve fails.
+    /// Collective.
     pub(crate) fn diffuse(
         &mut self,
         planned: &PlannedStep,
-        error: &mut DVector<f64>,
+        errors: &mut [DVector<f64>; 2],
     ) -> Result<(), RunError> {
-        if self.is_zero(error.as_slice()) {
+        if errors.iter().all(|error| self.is_zero(error.as_slice())) {
             return Ok(());
         }
-        let load = self.system(planned.k)?.diffusion_load(error.as_slice())?;
-        if let Some(change) = self.correction(planned, &load)? {
-            *error += change;
-        }
+        let system = self.system(planned.k)?;
+        let mut fields = errors.each_mut().map(|error| error.as_mut_slice());
+        stage("damage solve", || system.diffuse(&mut fields))?;
+        let partition = &self.problem.body.vertices.partition;
+        errors.iter_mut().try_for_each(|error| partition.update(error.as_mut_slice(), 1))?;
         Ok(())
     }
 

@@ -116,6 +116,9 @@ pub struct DamageSystem {
     solver: LinearSolver,
     rhs: Vector,
     unknown: Vector,
+    /// The right sides and solutions of [`Self::diffuse`].
+    flows: [Vector; 2],
+    changes: [Vector; 2],
     /// The nodes of ζ.
     vertices: Rc<Nodes>,
     /// ‖`rhs`‖₂ of the last damage step.
@@ -165,14 +168,17 @@ impl DamageSystem {
         }
         let with = |values: &[f64]| Matrix::with_pattern(session, 1, &pattern, values);
         let (mass, laplace) = (with(&masses)?, with(&laplacian)?);
+        let zeros = || Vector::zeros(session, owned);
         let mut system = Self {
             matrix: mass.duplicate()?,
             mass,
             laplace,
             // One iteration in double precision costs less than two in single precision.
             solver: LinearSolver::new(session, "damage_", owned, Precision::Full)?,
-            rhs: Vector::zeros(session, owned)?,
-            unknown: Vector::zeros(session, owned)?,
+            rhs: zeros()?,
+            unknown: zeros()?,
+            flows: [zeros()?, zeros()?],
+            changes: [zeros()?, zeros()?],
             vertices: Rc::clone(&body.vertices),
             rhs_size: 0.0,
             diffusion: diffusions[0],
@@ -266,13 +272,31 @@ impl DamageSystem {
         Ok(solved.then_some(correction))
     }
 
-    /// −κLδ, m²/s, at the owned nodes: the source load of the diffusion of δ = `field`.
+    /// Lets two fields δ diffuse: δ ← (M + kκL)⁻¹ Mδ = δ − (M + kκL)⁻¹ kκLδ at the owned nodes. They are unchanged, and the
+    /// answer is false, if the linear solver failed.
     ///
     /// # Errors
     /// PETSc failed.
-    pub fn diffusion_load(&mut self, field: &[f64]) -> Result<Vec<f64>, PetscError> {
-        self.unknown.set(&field[..self.unknown.owned()])?;
-        self.laplace.multiply(&self.unknown, &mut self.rhs)?;
-        self.rhs.read(|flow| flow.iter().map(|flow| -self.diffusion * flow).collect())
+    pub fn diffuse(&mut self, fields: &mut [&mut [f64]; 2]) -> Result<bool, PetscError> {
+        let (owned, factor) = (self.unknown.owned(), -self.step * self.diffusion);
+        for (field, flow) in fields.iter().zip(&mut self.flows) {
+            self.unknown.set(&field[..owned])?;
+            self.laplace.multiply(&self.unknown, flow)?;
+            flow.write(|flow| flow.iter_mut().for_each(|flow| *flow *= factor))?;
+        }
+        let (system, both) = (LinearSystem::of(&self.matrix), (&self.flows, &mut self.changes));
+        // Some digits of an estimated error do.
+        if !self.solver.solve_two(system, both.0, both.1, 1e-6)? {
+            return Ok(false);
+        }
+        let Nodes { weights, area, partition, .. } = &*self.vertices;
+        for (field, change) in fields.iter_mut().zip(&self.changes) {
+            // 1ᵀL = 0: the mean of the change is 0.
+            change.read(|change| {
+                let mean = partition.dot(weights, change, 1) / area;
+                field.iter_mut().zip(change).for_each(|(field, change)| *field += change - mean);
+            })?;
+        }
+        Ok(true)
     }
 }

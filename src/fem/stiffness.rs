@@ -23,6 +23,8 @@ pub struct Stiffness {
 /// K in the unknowns of nodal bases, from the elements.
 struct ElementOperator {
     sums: Box<dyn ElementSums>,
+    /// Per node: K_xx, K_xy and K_yy of the node with itself, without bases.
+    diagonal: Vec<[f64; 3]>,
     /// Per element and pair of its nodes (i, j): the places of both rows of K_ij among the stored entries.
     /// `NOT_STORED` if another rank owns the row, or if i ≠ j and one of the unknowns is fixed.
     places: Vec<[u32; 2]>,
@@ -36,14 +38,11 @@ struct ElementOperator {
 
 /// Sums over the elements, in displacements without nodal bases.
 pub(crate) trait ElementSums {
-    /// Takes ζ at the quadrature points.
-    fn set(&mut self, body: &Body, zeta: &[f64]);
+    /// Takes ζ at the quadrature points, and adds K_xx, K_xy and K_yy of each node with itself to `diagonal`.
+    fn set(&mut self, body: &Body, zeta: &[f64], diagonal: &mut [[f64; 3]]);
 
     /// Adds the internal forces of `u` to `force`.
     fn add_forces(&self, u: &[f64], force: &mut [f64]);
-
-    /// Adds K_xx, K_xy and K_yy of each node with itself.
-    fn add_diagonal(&self, diagonal: &mut [[f64; 3]]);
 
     /// Calls `add` for the pairs of nodes (i, j), j ≤ i, of every element: the numbers of (i, j) and of (j, i) among
     /// all pairs, the nodes, and K_ij. Element e has the pairs N² e to N² (e + 1), row by row.
@@ -98,6 +97,7 @@ impl Stiffness {
 
         let mut operator = ElementOperator {
             sums: elasticity.sums(body),
+            diagonal: vec![[0.0; 3]; body.nodes.points.len()],
             places,
             nodes: Rc::clone(&body.nodes),
             bases: bases.clone(),
@@ -123,21 +123,20 @@ impl Stiffness {
 
 impl ElementOperator {
     fn set_damage(&mut self, body: &Body, zeta: &[f64]) {
-        self.sums.set(body, zeta);
+        self.diagonal.fill([0.0; 3]);
+        self.sums.set(body, zeta, &mut self.diagonal);
     }
 
     /// The diagonal entries of the owned unknowns; D⁻ᵀ K_ii D⁻¹ with the bases D.
     fn diagonal(&self) -> Vec<f64> {
-        let mut blocks = vec![[0.0; 3]; self.nodes.points.len()];
-        self.sums.add_diagonal(&mut blocks);
-        let of_node = |(node, [xx, xy, yy]): (usize, [f64; 3])| match self.bases.inverse(node) {
+        let of_node = |(node, &[xx, xy, yy]): (usize, &[f64; 3])| match self.bases.inverse(node) {
             None => [xx, yy],
             Some(inverse) => {
                 let block = inverse.transpose() * Matrix2::new(xx, xy, xy, yy) * inverse;
                 [block[(0, 0)], block[(1, 1)]]
             }
         };
-        let owned = blocks.into_iter().take(self.nodes.partition.owned()).enumerate();
+        let owned = self.diagonal.iter().take(self.nodes.partition.owned()).enumerate();
         let mut diagonal: Vec<f64> = owned.flat_map(of_node).collect();
         let fixed = zip(&mut diagonal, self.bases.fixed()).filter(|(_, fixed)| **fixed);
         fixed.for_each(|(entry, _)| *entry = self.scale);

@@ -149,6 +149,11 @@ impl Cholesky {
         self.backward(&interface, x);
     }
 
+    /// [`Self::solve`] for two right sides of a factor without interface.
+    pub fn solve_two(&mut self, b: [&[f64]; 2], x: [&mut [f64]; 2]) {
+        self.solver.solve_two(b, x);
+    }
+
     /// The time of a factorisation, as the number of bytes that solves read in this time.
     pub(super) fn work(&self) -> f64 {
         let [operations, entries] = self.factor.operations_and_entries();

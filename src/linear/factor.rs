@@ -165,6 +165,25 @@ impl Factor {
         self.scaling.apply_in_place(z)
     }
 
+    /// [`Self::apply`] for two right sides. It takes much less time than two applications.
+    ///
+    /// # Errors
+    /// As in [`Self::apply`].
+    pub(super) fn apply_two(
+        &mut self,
+        r: &[Vector; 2],
+        z: &mut [Vector; 2],
+    ) -> Result<(), PetscError> {
+        self.start_application(&r[0])?;
+        let Some((_, Some(factor))) = &mut self.substructure else { return Err(missing()) };
+        let [first, second] = r;
+        let first = self.scaling.apply(first)?.to_vec();
+        let scaled = [&first, self.scaling.apply(second)?];
+        let [one, two] = z;
+        one.write(|one| two.write(|two| factor.apply_two(scaled, [one, two])))??;
+        z.iter_mut().try_for_each(|z| self.scaling.apply_in_place(z))
+    }
+
     /// Counts an application to `r`. There must be a factor for vectors of this size.
     fn start_application(&mut self, r: &Vector) -> Result<(), PetscError> {
         self.state.applications += 1;

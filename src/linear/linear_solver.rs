@@ -113,6 +113,36 @@ impl LinearSolver {
         self.finish(system, x, limit)
     }
 
+    /// Solves for two right sides from x = 0, each until ‖b − A x‖₂ ≤ `accuracy` ‖b‖₂, as [`Self::solve_renewing`] does. The
+    /// first application of a factor is one for both. It returns whether both reached their limits.
+    ///
+    /// # Errors
+    /// PETSc or CHOLMOD failed.
+    pub fn solve_two(
+        &mut self,
+        system: LinearSystem,
+        b: &[Vector; 2],
+        x: &mut [Vector; 2],
+        accuracy: f64,
+    ) -> Result<bool, PetscError> {
+        self.remake(system)?;
+        let applies = self.factor.exists() && self.uses_factor(system.matrix)?;
+        if applies {
+            self.factor.set_scaling(system.matrix)?;
+            stage(TRIANGULAR_SOLVES, || self.factor.apply_two(b, x))?;
+        } else {
+            x.iter_mut().try_for_each(|x| x.write(|x| x.fill(0.0)))?;
+        }
+        let mut converged = true;
+        for (b, x) in b.iter().zip(x) {
+            let first = b.norm()?;
+            self.start(system, b, x, accuracy * first)?;
+            (self.first_norm, self.iterations) = (first, usize::from(applies));
+            converged &= self.finish(system, x, accuracy * first)?.converged;
+        }
+        Ok(converged)
+    }
+
     /// r ← b − A x. Is ‖r‖₂ ≤ `limit` already?
     ///
     /// # Errors

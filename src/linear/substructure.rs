@@ -24,7 +24,7 @@ use super::{
 };
 use crate::petsc::{Communicator, Matrix, PetscError};
 use nalgebra::DMatrix;
-use std::iter;
+use std::iter::{self, zip};
 
 /// The factor of a matrix whose unknowns are divided among the ranks.
 pub(super) struct Substructure {
@@ -149,6 +149,14 @@ impl Substructure {
         let [b, x] = &mut self.vectors;
         self.schur.solve(&b[shared..], &mut x[shared..]);
         self.expand(z);
+    }
+
+    /// [`Self::apply`] for two right sides. Collective.
+    pub(super) fn apply_two(&mut self, r: [&[f64]; 2], z: [&mut [f64]; 2]) {
+        if self.division.interface.is_empty() {
+            return self.local.solve_two(r, z);
+        }
+        zip(r, z).for_each(|(r, z)| self.apply(r, z));
     }
 
     /// Eliminates the interior from A x = `r`. Collective.

@@ -101,11 +101,16 @@ impl Mesh {
     /// The triangle at each of these boundary edges, and the number of its side there, by the ends in increasing order.
     pub fn triangles_at(&self, edges: &[[usize; 2]]) -> HashMap<[usize; 2], (usize, usize)> {
         let wanted: HashSet<_> = edges.iter().map(|edge| sorted(*edge)).collect();
+        // Few nodes are ends: most sides need no search.
+        let mut is_end = vec![false; self.nodes.len()];
+        edges.as_flattened().iter().for_each(|&node| is_end[node] = true);
         let sides = |(t, &[a, b, c]): (usize, &[usize; 3])| {
             [([a, b], 0), ([b, c], 1), ([c, a], 2)].map(|(side, i)| (sorted(side), (t, i)))
         };
         let sides = self.triangles.iter().enumerate().flat_map(sides);
-        sides.filter(|(side, _)| wanted.contains(side)).collect()
+        let is_wanted =
+            |side: &[usize; 2]| side.iter().all(|&n| is_end[n]) && wanted.contains(side);
+        sides.filter(|(side, _)| is_wanted(side)).collect()
     }
 
     /// A place as text; see [`place`].

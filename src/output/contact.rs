@@ -3,7 +3,7 @@
 use super::{
     OutputError, Table,
     growing_file::GrowingFile,
-    vtk::{DataArray, REAL, cells_text, entry, list_of_frames, vtk_file},
+    vtk::{DataArray, REAL, cells_text, entry, list_of_frames, piece},
     write_whole,
 };
 use crate::observe::ContactRow;
@@ -54,20 +54,17 @@ fn lines(rows: &[ContactRow]) -> String {
     let joined: Vec<usize> =
         (1..rows.len()).map(|i| [i - 1, i]).filter(is_joined).flatten().collect();
     let points: Vec<_> = rows.iter().map(|row| [row.x, row.y]).collect();
-    let scalar = |name, of: fn(&ContactRow) -> f64| {
-        DataArray::new(name, REAL, 1, rows.iter().map(of)).element()
-    };
+    let scalar =
+        |name, of: fn(&ContactRow) -> f64| DataArray::new(name, REAL, 1, rows.iter().map(of));
     // The pressure acts on the body, against ν.
     let pressure =
         rows.iter().flat_map(|row| [row.normal_x, row.normal_y, 0.0].map(|n| -row.pressure * n));
-    let piece = format!(
-        "{}<PointData>\n{}{}{}{}{}</PointData>\n</Piece>\n",
-        cells_text(&points, &joined, LINE),
-        DataArray::new("pressure_on_body", REAL, 3, pressure).element(),
+    let fields = [
+        DataArray::new("pressure_on_body", REAL, 3, pressure),
         scalar("normal_pressure", |row| row.pressure),
         scalar("gap", |row| row.gap),
         scalar("arc_length", |row| row.arc_length),
         scalar("active", |row| f64::from(row.active)),
-    );
-    vtk_file("UnstructuredGrid", "", &piece)
+    ];
+    piece(&cells_text(&points, &joined, LINE), &fields, &[])
 }

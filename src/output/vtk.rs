@@ -55,28 +55,45 @@ impl DataArray {
         format!("<PDataArray {}/>\n", self.attributes)
     }
 
-    /// The element `<DataArray>` with the values.
-    pub(super) fn element(&self) -> String {
-        let mut text = format!("<DataArray {} format=\"binary\">", self.attributes);
-        STANDARD.encode_string(&self.bytes, &mut text);
-        text + "</DataArray>\n"
+    /// Adds the element `<DataArray>` with the values.
+    pub(super) fn write(&self, text: &mut String) {
+        *text += &format!("<DataArray {} format=\"binary\">", self.attributes);
+        text.reserve(self.bytes.len() / 3 * 4 + 64);
+        STANDARD.encode_string(&self.bytes, text);
+        *text += "</DataArray>\n";
     }
 }
 
-/// A VTK file with an element `kind`, its `attributes` and its `content`. Arrays in the content are encoded by
-/// [`DataArray`].
-pub(super) fn vtk_file(kind: &str, attributes: &str, content: &str) -> String {
-    format!(
+/// A VTK file with an element `kind`, its `attributes` and its `content`.
+pub(super) fn vtk_file(kind: &str, attributes: &str, content: impl FnOnce(&mut String)) -> String {
+    let mut text = format!(
         "<?xml version=\"1.0\"?>\n\
          <VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" \
          header_type=\"UInt64\">\n\
-         <{kind}{attributes}>\n{content}</{kind}>\n</VTKFile>\n"
-    )
+         <{kind}{attributes}>\n"
+    );
+    content(&mut text);
+    text + &format!("</{kind}>\n</VTKFile>\n")
+}
+
+/// The file of an unstructured grid with one piece, which begins as [`cells_text`] does, and the fields of its points and cells.
+pub(super) fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
+    vtk_file("UnstructuredGrid", "", |text| {
+        *text += mesh;
+        for (kind, arrays) in [("PointData", points), ("CellData", cells)] {
+            if !arrays.is_empty() {
+                *text += &format!("<{kind}>\n");
+                arrays.iter().for_each(|array| array.write(text));
+                *text += &format!("</{kind}>\n");
+            }
+        }
+        *text += "</Piece>\n";
+    })
 }
 
 /// A list of frames over time for ParaView. The first frame creates the file.
 pub(super) fn list_of_frames(path: PathBuf) -> GrowingFile {
-    let empty = vtk_file("Collection", "", "");
+    let empty = vtk_file("Collection", "", |_| ());
     GrowingFile::new(path, empty.trim_end_matches(LIST_END).to_owned(), LIST_END)
 }
 
@@ -96,14 +113,12 @@ pub(super) fn cells_text(
     let offsets = (1..=cells).map(|cell| (of_cell * cell) as i32);
     let types = iter::repeat_n(kind, cells);
     let nodes = nodes.iter().map(|&node| node as i32);
-    format!(
-        "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
-         <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n",
-        points.len(),
-        cells,
-        DataArray::new("Points", REAL, 3, coordinates).element(),
-        DataArray::new("connectivity", INTEGER, 1, nodes).element(),
-        DataArray::new("offsets", INTEGER, 1, offsets).element(),
-        DataArray::new("types", BYTE, 1, types).element(),
-    )
+    let head = format!("<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{cells}\">\n", points.len());
+    let mut text = head + "<Points>\n";
+    DataArray::new("Points", REAL, 3, coordinates).write(&mut text);
+    text += "</Points>\n<Cells>\n";
+    DataArray::new("connectivity", INTEGER, 1, nodes).write(&mut text);
+    DataArray::new("offsets", INTEGER, 1, offsets).write(&mut text);
+    DataArray::new("types", BYTE, 1, types).write(&mut text);
+    text + "</Cells>\n"
 }

@@ -5,7 +5,7 @@ use super::{
     contact::ContactWriter,
     digits,
     growing_file::{GrowingFile, Written},
-    vtk::{DataArray, INTEGER, REAL, SINGLE, cells_text, entry, list_of_frames, vtk_file},
+    vtk::{DataArray, INTEGER, REAL, SINGLE, cells_text, entry, list_of_frames, piece, vtk_file},
     write_whole,
 };
 use crate::{
@@ -187,16 +187,6 @@ impl Drop for FieldWriter {
     }
 }
 
-/// The file of a piece with these fields.
-fn piece(mesh: &str, points: &[DataArray], cells: &[DataArray]) -> String {
-    let [points, cells] =
-        [points, cells].map(|arrays| arrays.iter().map(DataArray::element).collect::<String>());
-    let piece = format!(
-        "{mesh}<PointData>\n{points}</PointData>\n<CellData>\n{cells}</CellData>\n</Piece>\n"
-    );
-    vtk_file("UnstructuredGrid", "", &piece)
-}
-
 /// The nodal fields of u, ζ and contact, with the `pressures` at nodes of Γ_C. Outside Γ_C the contact pressure is 0
 /// and the remaining gap NaN. At a corner with two gap conditions they are the larger pressure and the smaller gap.
 /// Collective.
@@ -282,5 +272,5 @@ fn list_of_pieces(
         "<PPointData>\n{points}</PPointData>\n<PCellData>\n{cells}</PCellData>\n\
          <PPoints>\n{coordinates}</PPoints>\n{files}"
     );
-    vtk_file("PUnstructuredGrid", " GhostLevel=\"0\"", &pieces)
+    vtk_file("PUnstructuredGrid", " GhostLevel=\"0\"", |text| *text += &pieces)
 }

@@ -49,6 +49,33 @@ fn the_mean_changes_by_the_source_alone_however_large_the_diffusion() {
     }
 }
 
+/// Errors of ζ diffuse as ζ itself does without a source, with the factor of the system and with one of another step.
+#[test]
+fn two_fields_diffuse_as_zeta_does() {
+    let (session, body) = (Session::start(&[]).unwrap(), Body::new(distorted(9), Order::Linear));
+    let nodes = body.mesh.nodes.len();
+    let mut random = Random::new(6);
+    let fields = [random.field(nodes), random.field(nodes)];
+    for diffusion in [1e-3, 1.0, 1e8] {
+        let mass = Mass::Consistent;
+        let mut system = DamageSystem::new(&session, &body, mass, &[diffusion], 0.1).unwrap();
+        let mut diffused = fields.clone();
+        assert!(system.diffuse(&mut diffused.each_mut().map(|of| &mut of[..])).unwrap());
+        system.set_step(0.15).unwrap();
+        let mut of_later = fields.clone();
+        assert!(system.diffuse(&mut of_later.each_mut().map(|of| &mut of[..])).unwrap());
+        for (step, found) in [(0.1, diffused), (0.15, of_later)] {
+            let new = || DamageSystem::new(&session, &body, mass, &[diffusion], step).unwrap();
+            for (field, found) in fields.iter().zip(&found) {
+                let mut exact = field.clone();
+                assert!(new().advance(&vec![0.0; nodes], &mut exact).unwrap());
+                let off = exact.iter().zip(found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-5, "{diffusion:e}, {step}: {off:e}");
+            }
+        }
+    }
+}
+
 /// Testing (28) with 1: ∫ζ_n − ∫ζ_{n−1} = k ∫φ_{n−1}, also where diffusion makes the damage uniform.
 #[test]
 fn the_loss_of_damage_in_a_run_is_the_integral_of_the_source() {

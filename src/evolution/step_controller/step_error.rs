@@ -73,18 +73,23 @@ impl StepController<'_> {
     ) -> Result<bool, RunError> {
         let (threshold, mut reached) = (self.problem.threshold(), false);
         let omega = planned.length / self.history.length;
-        let beta = omega * omega / (1.0 + 2.0 * omega);
-        for (i, error) in errors.into_iter().enumerate() {
-            let (earlier, rate) = (&self.history.errors[i], &self.history.error_rates[i]);
-            let change = &self.history.error_changes[i];
+        let beta = if self.two_step { omega * omega / (1.0 + 2.0 * omega) } else { 0.0 };
+        let before = |i: usize| (&self.history.errors[i], &self.history.error_changes[i]);
+        let mut transported = [0, 1].map(|i| {
+            let (error, change) = before(i);
+            error + beta * (change - &self.history.step_errors[i])
+        });
+        for (i, transported) in transported.iter_mut().enumerate() {
+            let (earlier, change) = before(i);
             let predicted = earlier + omega * change;
             let after = self.source_change(zeta, source, &(predicted + correction))?;
-            let (beta, of_source) =
-                if self.two_step { (beta, after) } else { (0.0, 0.5 * (rate + after)) };
-            let transported = change - &self.history.step_errors[i];
-            self.history.step_errors[i] = error.clone();
-            let mut error = earlier + beta * transported + planned.k * of_source + error;
-            damage_step.diffuse(planned, &mut error)?;
+            let of_source =
+                if self.two_step { after } else { 0.5 * (&self.history.error_rates[i] + after) };
+            *transported += planned.k * of_source + &errors[i];
+        }
+        damage_step.diffuse(planned, &mut transported)?;
+        self.history.step_errors = errors;
+        for (i, error) in transported.into_iter().enumerate() {
             // A bound beyond ζ_* says no more.
             let most = -(zeta + correction).add_scalar(-threshold);
             let reaches = error.iter().zip(&most).any(|(error, most)| error <= most);

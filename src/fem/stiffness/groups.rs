@@ -63,17 +63,31 @@ impl<const N: usize, const Q: usize> Groups<N, Q> {
 }
 
 impl<const N: usize, const Q: usize> ElementSums for Groups<N, Q> {
-    fn set(&mut self, body: &Body, zeta: &[f64]) {
+    fn set(&mut self, body: &Body, zeta: &[f64], diagonal: &mut [[f64; 3]]) {
         let zeta = zeta.as_chunks::<Q>().0.chunks(LANES);
-        for (g, (group, zeta)) in zip(&mut self.groups, zeta).enumerate() {
-            for (q, point) in group.points.iter_mut().enumerate() {
-                let [mut lambda, mut mu] = [[0.0; LANES]; 2];
+        for (g, (Group { nodes, points }, zeta)) in zip(&mut self.groups, zeta).enumerate() {
+            let mut blocks = [[f64x8::ZERO; 3]; N];
+            for (q, Point { gradients, weight, lambda, mu }) in points.iter_mut().enumerate() {
+                let [mut of_lambda, mut of_mu] = [[0.0; LANES]; 2];
                 for (lane, zeta) in zeta.iter().enumerate() {
                     let d = self.elasticity.d(body, LANES * g + lane);
-                    (lambda[lane], mu[lane]) = (zeta[q] * d[(0, 1)], zeta[q] * d[(2, 2)]);
+                    (of_lambda[lane], of_mu[lane]) = (zeta[q] * d[(0, 1)], zeta[q] * d[(2, 2)]);
                 }
-                point.lambda = point.weight * f64x8::from(lambda);
-                point.mu = point.weight * f64x8::from(mu);
+                (*lambda, *mu) = (*weight * f64x8::from(of_lambda), *weight * f64x8::from(of_mu));
+                let sum = *lambda + *mu;
+                for ([xx, xy, yy], [x, y]) in zip(&mut blocks, gradients) {
+                    let (x_x, x_y, y_y) = (*x * *x, *x * *y, *y * *y);
+                    let both = *mu * (x_x + y_y);
+                    (*xx, *xy, *yy) =
+                        (*xx + (sum * x_x + both), *xy + sum * x_y, *yy + (sum * y_y + both));
+                }
+            }
+            for (nodes, block) in zip(nodes, blocks) {
+                let [xx, xy, yy] = block.map(f64x8::to_array);
+                for (lane, &node) in nodes.iter().enumerate() {
+                    let sums = &mut diagonal[node as usize];
+                    *sums = [sums[0] + xx[lane], sums[1] + xy[lane], sums[2] + yy[lane]];
+                }
             }
         }
     }
@@ -102,18 +116,6 @@ impl<const N: usize, const Q: usize> ElementSums for Groups<N, Q> {
                 for (lane, &node) in nodes.iter().enumerate() {
                     let [x, y] = force[node as usize];
                     force[node as usize] = [x + fx[lane], y + fy[lane]];
-                }
-            }
-        }
-    }
-
-    fn add_diagonal(&self, diagonal: &mut [[f64; 3]]) {
-        for group in &self.groups {
-            for (i, nodes) in group.nodes.iter().enumerate() {
-                let [xx, xy, _, yy] = group.block(i, i).map(f64x8::to_array);
-                for (lane, &node) in nodes.iter().enumerate() {
-                    let sums = &mut diagonal[node as usize];
-                    *sums = [sums[0] + xx[lane], sums[1] + xy[lane], sums[2] + yy[lane]];
                 }
             }
         }
