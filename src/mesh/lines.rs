@@ -34,9 +34,9 @@ impl<'a> Lines<'a> {
     /// The boundary, and the interfaces between triangles of different zones.
     pub fn new<Z: PartialEq>(mesh: &'a Mesh, zone: impl Fn(usize) -> Z) -> Self {
         let mut ends = BTreeMap::<usize, Vec<usize>>::new();
-        for both in sides(&mesh.triangles).chunk_by(|a, b| a.edge == b.edge) {
-            let [a, b] = both[0].edge;
-            if both.len() == 1 || zone(both[0].triangle) != zone(both[1].triangle) {
+        for both in sides(&mesh.triangles).chunk_by(|a, b| a.ends == b.ends) {
+            let [a, b] = both[0].edge();
+            if both.len() == 1 || zone(both[0].triangle()) != zone(both[1].triangle()) {
                 ends.entry(a).or_default().push(b);
                 ends.entry(b).or_default().push(a);
             }

@@ -6,7 +6,7 @@
 //! shapes, whose angles are at least half its smallest one (I. G. Rosenberg, F. Stenger, SIAM J.
 //! Numer. Anal. 12, 1975), and those of a right isosceles triangle are right isosceles.
 
-use super::{Mesh, MeshError, Side, sides, sorted, twice_area};
+use super::{Mesh, MeshError, sides, sorted, twice_area};
 
 /// Slightly below 1: sizes whose ratio is between this and 1 are equal up to rounding. So meshes do not depend on units.
 pub(crate) const TIES: f64 = 1.0 - 1e-9;
@@ -162,14 +162,15 @@ impl Edges {
     fn of(triangles: &[[usize; 3]]) -> Self {
         let of_triangle = vec![[0; 3]; triangles.len()];
         let mut edges = Self { ends: Vec::new(), triangles: Vec::new(), of_triangle };
-        for Side { edge: [low, high], on_left, triangle } in sides(triangles) {
+        for side in sides(triangles) {
+            let ([low, high], triangle) = (side.edge(), side.triangle());
             if edges.ends.last() != Some(&[low, high]) {
                 edges.ends.push([low, high]);
                 edges.triangles.push([triangle; 2]);
             }
             let last = edges.ends.len() - 1;
             edges.triangles[last][1] = triangle;
-            let from = if on_left { low } else { high };
+            let from = if side.on_left { low } else { high };
             for (node, edge) in triangles[triangle].iter().zip(&mut edges.of_triangle[triangle]) {
                 if *node == from {
                     *edge = last;

@@ -39,17 +39,17 @@ pub fn mesh(mut contents: Contents) -> Result<Mesh> {
     })?;
     let sides = sides(&triangles);
     let same_side =
-        |pair: &&[Side]| (pair[0].edge, pair[0].on_left) == (pair[1].edge, pair[1].on_left);
+        |pair: &&[Side]| (pair[0].ends, pair[0].on_left) == (pair[1].ends, pair[1].on_left);
     if let Some(pair) = sides.windows(2).find(same_side) {
-        let [first, second] = [0, 1].map(|i| elements[pair[i].triangle]);
-        let [a, b] = pair[0].edge.map(|node| listed[node].tag);
+        let [first, second] = [0, 1].map(|i| elements[pair[i].triangle()]);
+        let [a, b] = pair[0].edge().map(|node| listed[node].tag);
         let problem = format!(
             "triangles {} and {} lie on the same side of their common edge, nodes {a} and {b} at {}: two \
              surfaces overlap, of which one should go (gmsh: Coherence), or the mesh folds over \
              itself",
             first.tag,
             second.tag,
-            place(extent(&nodes), nodes[pair[0].edge[0]])
+            place(extent(&nodes), nodes[pair[0].edge()[0]])
         );
         return error_at(second.at, problem);
     }
@@ -226,8 +226,8 @@ fn curves(contents: &Contents, index: &Index, sides: &[Side]) -> BTreeMap<String
         }
         let mut edge = nodes.map(|tag| index.get(&tag).copied().unwrap_or(usize::MAX));
         edge.sort_unstable();
-        let first = sides.partition_point(|side| side.edge < edge);
-        let around = sides[first..].iter().take_while(|side| side.edge == edge);
+        let first = sides.partition_point(|side| side.edge() < edge);
+        let around = sides[first..].iter().take_while(|side| side.edge() == edge);
         let curve = curves.entry(name).or_default();
         match around.collect::<Vec<_>>()[..] {
             [side] if side.on_left => curve.edges.push(edge),

@@ -35,11 +35,11 @@ pub fn mend(
         let (count, sides) = (flat.len(), sides(triangles));
         flat.retain(|&t| {
             let (edge, m) = longest_side(nodes, triangles[t]);
-            let first = sides.partition_point(|side| side.edge < edge);
+            let first = sides.partition_point(|side| side.edge() < edge);
             let around: Vec<&Side> =
-                sides[first..].iter().take_while(|side| side.edge == edge).collect();
+                sides[first..].iter().take_while(|side| side.edge() == edge).collect();
             let [own, other] = around[..] else { return true };
-            let neighbour = own.triangle + other.triangle - t;
+            let neighbour = own.triangle() + other.triangle() - t;
             // It has these three nodes unless it was split before.
             let Some(at) = (0..3).find(|&k| !edge.contains(&triangles[neighbour][k])) else {
                 return true;

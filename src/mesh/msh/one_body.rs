@@ -5,8 +5,8 @@ use crate::mesh::{Side, extent, place};
 
 /// Checks that the triangles are one body: connected through their `sides`.
 pub fn check(nodes: &[[f64; 2]], triangles: &[[usize; 3]], sides: &[Side]) -> Result<()> {
-    let neighbours = sides.windows(2).filter(|pair| pair[0].edge == pair[1].edge);
-    let neighbours = neighbours.map(|pair| [pair[0].triangle, pair[1].triangle]);
+    let neighbours = sides.windows(2).filter(|pair| pair[0].ends == pair[1].ends);
+    let neighbours = neighbours.map(|pair| [pair[0].triangle(), pair[1].triangle()]);
     let part = components(triangles.len(), neighbours);
     if part.iter().all(|&part| part == 0) {
         return Ok(());

@@ -117,7 +117,8 @@ impl Mesh {
 
     /// The midpoints, m, of all edges, sorted by their ends in increasing order.
     fn midpoints(&self) -> Vec<([usize; 2], [f64; 2])> {
-        let mut edges: Vec<_> = sides(&self.triangles).into_iter().map(|side| side.edge).collect();
+        let mut edges: Vec<_> =
+            sides(&self.triangles).into_iter().map(|side| side.edge()).collect();
         edges.dedup();
         edges.into_iter().map(|edge| (edge, self.midpoint(edge))).collect()
     }
