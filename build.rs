@@ -12,7 +12,7 @@ const PETSC: &str = "\
     PetscOptionsLeftGet|PetscOptionsLeftRestore|\
     PetscLogStageGetId|PetscLogStageRegister|PetscLogStagePush|PetscLogStagePop|\
     MPI_Comm_size|MPI_Comm_rank|MPI_Allreduce|MPI_Bcast|MPI_Type_contiguous|MPI_Type_commit|MPI_Type_free|\
-    MPI_Ibarrier|MPI_Test|MPI_Abort|omp_set_max_active_levels|mallopt|dtrsm_|\
+    MPI_Ibarrier|MPI_Test|MPI_Abort|omp_set_max_active_levels|mallopt|dtrsm_|fork|waitpid|dup2|dlsym|\
     PetscSFCreate|PetscSFDestroy|PetscSFSetGraph|PetscSFBcastBegin|PetscSFBcastEnd|\
     MatPartitioningCreate|MatPartitioningDestroy|MatPartitioningSetType|\
     MatPartitioningSetAdjacency|MatPartitioningSetFromOptions|MatPartitioningApply|\
@@ -94,7 +94,7 @@ fn find_and_declare() -> Result<(), String> {
     let values = MPI
         .map(|[kind, name, _]| format!("static const MPI_{kind} SIGNORINI_{name} = MPI_{name};\n"));
     let headers = format!(
-        "#include <petsctao.h>\n#include <petscsf.h>\n{}\
+        "#include <petsctao.h>\n#include <petscsf.h>\n#include <dlfcn.h>\n#include <sys/wait.h>\n#include <unistd.h>\n{}\
          #ifndef OPEN_MPI\n{}#endif\n\
          void omp_set_max_active_levels(int);\n\
          void dtrsm_(const char *, const char *, const char *, const char *, const int *, const int *,\

@@ -22,7 +22,6 @@ import itertools
 import os
 import re
 import signal
-import subprocess
 import sys
 import time
 import zlib
@@ -31,6 +30,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from server import Server
 from signorini_files import check, check_folder, whole
 from signorini_summaries import columns_of, rows_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
@@ -187,18 +187,26 @@ def claim(locks, folder):
         fcntl.lockf(locks, fcntl.LOCK_UN, 1, place)
 
 
-def run(command, runs, running):
-    """Runs the program beside `runs` - 1 others, as one of the processes `running`; returns the error, "" if there is
-    none. Signals of the terminal come to it by this process alone."""
+@contextmanager
+def servers(runs):
+    """A server for each of the `runs` at once."""
     # Each run has a core of its own.
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "SIGNORINI_RUNS": str(runs)}
-    command = [os.environ["SIGNORINI"], *command]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=environment,
-                          process_group=0) as process:
-        running.add(process)
-        error = process.communicate()[1]
-        running.discard(process)
-    return error.strip() if process.returncode else ""
+    idle = [Server(os.environ["SIGNORINI"], env=environment) for _ in range(runs)]
+    yield idle
+    for server in idle:
+        server.close()
+
+
+def run(command, idle, running):
+    """Runs the program by one of the servers `idle`, which is meanwhile one of those `running`; returns the error, "" if there
+    is none."""
+    server = idle.pop()
+    running.add(server)
+    code, error = server.run(command)
+    running.discard(server)
+    idle.append(server)
+    return error.strip() if code else ""
 
 
 @contextmanager
@@ -208,8 +216,8 @@ def stopping(pool, running):
         yield
     except KeyboardInterrupt:
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in list(running):
-            process.send_signal(signal.SIGINT)
+        for server in list(running):
+            server.send_signal(signal.SIGINT)
         print("stopped; the same command goes on, with `-- --restart` also within the runs", file=sys.stderr)
         raise
 
@@ -232,12 +240,12 @@ def run_all(out, everything, inputs, jobs, columns):
 
     def attempt(of):
         with claim(locks, of[0]) as is_free:
-            return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], jobs, running)
+            return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], idle, running)
 
     with own(out) as locks:
         while open_runs:
             later = {}
-            with ThreadPoolExecutor(jobs) as pool, stopping(pool, running):
+            with servers(jobs) as idle, ThreadPoolExecutor(jobs) as pool, stopping(pool, running):
                 for k, error in enumerate(pool.map(attempt, open_runs)):
                     # Another study has it, or the memory may suffice for it alone, after the others.
                     if error is None or jobs > 1 and "not enough memory" in error:

@@ -10,11 +10,7 @@ use signorini::{
     petsc::Allocator,
     printable::printable,
 };
-use std::{
-    env,
-    path::PathBuf,
-    process::{self, ExitCode},
-};
+use std::{path::PathBuf, process::ExitCode};
 
 #[global_allocator]
 static ALLOCATOR: Allocator = Allocator { out_of_memory: command::out_of_memory };
@@ -88,6 +84,13 @@ enum Command {
         /// The folder.
         folder: PathBuf,
     },
+    /// Do the commands on standard input in forks of this process, e.g. ["run", "scene.toml"].
+    #[command(hide = true)]
+    Serve {
+        /// Their output goes to standard error.
+        #[arg(long)]
+        output: bool,
+    },
     /// Mesh the .geo files of scenes with gmsh, unless this was done before.
     Mesh {
         /// Scene files.
@@ -103,7 +106,20 @@ fn main() -> ExitCode {
     if let Err(error) = command::install() {
         command::tell("warning", &format!("no handlers for signals: {error}"));
     }
-    let result = match Arguments::try_parse().unwrap_or_else(refuse).command {
+    execute().into()
+}
+
+/// Does the command of the command line, and returns the exit code.
+fn execute() -> u8 {
+    let command = match Arguments::try_parse_from(command::words()) {
+        Ok(arguments) => arguments.command,
+        Err(error) => return refuse(error),
+    };
+    // The server has no other thread: it forks.
+    if !matches!(command, Command::Serve { .. }) {
+        command::watch();
+    }
+    let result = match command {
         Command::Run(arguments) => command::run(&arguments),
         Command::New { name } => command::new(&name),
         Command::Check(arguments) => command::check(&arguments),
@@ -125,23 +141,25 @@ fn main() -> ExitCode {
         Command::Keys { schema, figures } => command::keys(schema, figures),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),
         Command::Man { folder } => command::man(&folder, Arguments::command()),
+        Command::Serve { output } => command::serve(output, execute),
         Command::Mesh { scenes, set } => command::mesh(&scenes, &set),
     };
     let lost = lost().map_or(Ok(()), |error| Err(Failure::from(error)));
     match result.and(lost) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             failure.message.iter().for_each(|message| command::tell("error", message));
-            ExitCode::from(failure.code)
+            failure.code
         }
     }
 }
 
-/// Prints an error of the arguments, or the help, and exits. The error shows the arguments as the terminal may have them.
-fn refuse(error: clap::Error) -> Arguments {
-    let words = env::args_os().map(|word| printable(&word.to_string_lossy()));
+/// Prints an error of the arguments, or the help, and returns the exit code. The error shows the arguments as the terminal may
+/// have them.
+fn refuse(error: clap::Error) -> u8 {
+    let words = command::words().into_iter().map(|word| printable(&word.to_string_lossy()));
     let error = Arguments::try_parse_from(words).err().unwrap_or(error);
     keep(error.print());
     lost().iter().for_each(|error| command::tell("error", error));
-    process::exit(if lost().is_some() { 1 } else { error.exit_code() })
+    if lost().is_some() { 1 } else { error.exit_code() as u8 }
 }

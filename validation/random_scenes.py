@@ -19,12 +19,14 @@ import time
 import traceback
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import cache
 from pathlib import Path
 
 # The matrices of the verification are small: threads would only wait for each other.
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", SCOTCH_PTHREAD_NUMBER="1")
 
 from shared import parser_of  # noqa: E402
+from server import Server  # noqa: E402
 from judge import Verdict, judge  # noqa: E402
 from random_bodies import write_msh  # noqa: E402
 from random_draw import draw, vary  # noqa: E402
@@ -38,13 +40,27 @@ ENVIRONMENT = {**os.environ, "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_R
 BAD = ("wrong", "refused wrongly", "no verdict")
 
 
+@cache
+def server(binary):
+    """The server of this process."""
+    return Server(binary, output=True, env=ENVIRONMENT)
+
+
 def run(binary, folder, solver, ranks):
     """Runs folder/scene.toml into folder/out; returns (exit code, output), None out of time."""
-    command = [str(binary), "run", "scene.toml", "--out", "out", "--solver", solver]
+    words = lambda at: ["run", str(at / "scene.toml"), "--out", str(at / "out"), "--solver", solver]
+    command = [str(binary), *words(Path())]
     if ranks > 1:
         command = ["mpiexec", "--oversubscribe", "-n", str(ranks), *command]
     (folder / "command").write_text(" ".join(command) + "\n")
     output = folder / "log"
+    if ranks == 1:
+        try:
+            code, text = server(binary).run(words(folder), LIMIT)
+        except TimeoutError:
+            code, text = None, ""
+        output.write_text(text.replace(f"{folder}/", ""))
+        return code, output.read_text()
     with open(output, "w") as log:
         process = subprocess.Popen(command, cwd=folder, stdout=log, stderr=log, env=ENVIRONMENT, start_new_session=True)
         try:

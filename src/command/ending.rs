@@ -32,13 +32,16 @@ pub fn install() -> io::Result<()> {
         flag::register_usize(signal, RECEIVED.clone(), meant as usize)?;
         flag::register(signal, AT_ONCE.clone())?;
     }
-    // Without the thread a second signal ends the process.
-    drop(thread::Builder::new().stack_size(1 << 16).spawn(watch));
     Ok(())
 }
 
-/// Ends the process 7 s after a signal, if it has not ended by itself: a factorisation can take minutes.
-fn watch() {
+/// Starts a thread that ends the process 7 s after a signal, if it has not ended by itself: a factorisation can take minutes.
+pub fn watch() {
+    // Without the thread a second signal ends the process.
+    drop(thread::Builder::new().stack_size(1 << 16).spawn(end_after_signal));
+}
+
+fn end_after_signal() {
     let signal = loop {
         match received() {
             Some(signal) => break signal,

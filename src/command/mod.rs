@@ -18,16 +18,18 @@ mod recorder;
 mod run;
 mod screen;
 mod script;
+mod serve;
 mod summary;
 mod task;
 
 pub use check::check;
-pub use ending::{install, out_of_memory};
+pub use ending::{install, out_of_memory, watch};
 pub use export::{ExportArguments, export};
 pub use new::new;
 pub use provenance::version;
 pub use run::{RunArguments, run};
 pub use script::{ScriptArguments, script};
+pub use serve::{serve, words};
 
 use clap::Args;
 use ranks::require_one_process;

@@ -1,5 +1,6 @@
 //! The origin of a result: program, date, machine and command line.
 
+use super::words;
 use serde_json::{Value, json};
 use signorini::petsc;
 use std::{env, fs, thread, time::SystemTime};
@@ -7,7 +8,7 @@ use std::{env, fs, thread, time::SystemTime};
 /// `provenance` of `summary.json` of a run whose mesh this version of gmsh made. Unknown values are null.
 pub fn provenance(gmsh: Option<&str>) -> Value {
     let now = humantime::format_rfc3339_seconds(SystemTime::now());
-    let arguments = env::args_os().map(|word| word.to_string_lossy().into_owned());
+    let arguments = words().into_iter().map(|word| word.to_string_lossy().into_owned());
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "commit": commit(),

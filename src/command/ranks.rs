@@ -1,6 +1,6 @@
 //! Several ranks: how a run starts itself on them, and failures, at which all ranks end with one message and one exit code.
 
-use super::{Failure, tell};
+use super::{Failure, tell, words};
 use signorini::{
     evolution::RunError,
     petsc::{Communicator, Session},
@@ -56,7 +56,7 @@ pub fn paying(unknowns: usize) -> usize {
 
 /// Replaces this process by the same command on this number of `ranks`, without its argument `--ranks`.
 pub fn start(ranks: usize) -> Result<Infallible, Failure> {
-    let (mut passed, mut arguments) = (Vec::new(), env::args_os().skip(1));
+    let (mut passed, mut arguments) = (Vec::new(), words().into_iter().skip(1));
     while let Some(argument) = arguments.next() {
         if argument == "--" {
             passed.push(argument);

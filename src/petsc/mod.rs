@@ -15,6 +15,7 @@
 mod allocator;
 mod communicator;
 mod error;
+mod fork;
 mod ghosts;
 mod graph;
 mod handle;

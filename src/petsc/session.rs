@@ -1,8 +1,8 @@
 //! Starting and ending PETSc (PetscInitialize, PetscFinalize).
 
 use super::{
-    Communicator, PetscError, check, error::keep_message, options, options::c_string, raw,
-    shell_preconditioner,
+    Communicator, PetscError, check, error::keep_message, fork::is_fork, options,
+    options::c_string, raw, shell_preconditioner,
 };
 use crate::memory::address_space;
 use std::{
@@ -95,12 +95,14 @@ impl Session {
         Communicator::of_world()
     }
 
-    /// Ends PETSc and MPI. Call it last; without it MPI complains at exit.
+    /// Ends PETSc and MPI. Call it last; without it MPI complains at exit. In a fork they belong to the process that started
+    /// them, which also has a session, and nothing is to be ended.
     ///
     /// # Errors
     /// The thread still has objects or another session, or PETSc fails to finalize.
     pub fn finalize(self) -> Result<(), PetscError> {
-        match Rc::strong_count(&self.turn) - 1 {
+        match Rc::strong_count(&self.turn) - 1 - usize::from(is_fork()) {
+            0 if is_fork() => Ok(()),
             0 => {
                 // The caller lists the unused options; PETSc would do so again.
                 options::set_default_option("-options_left", "0")?;

@@ -25,3 +25,4 @@ mod odd_names;
 mod provenance;
 mod refused;
 mod restart;
+mod serve;
