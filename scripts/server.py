@@ -42,8 +42,9 @@ class Server:
         self.errors.seek(0)
         self.errors.truncate()
         if code and not any(line.startswith("error") for line in text.splitlines()):
-            signals = code - 128 in signal.valid_signals()
-            text += f"error: the run ended with exit code {code}{f': {signal.strsignal(code - 128)}' * signals}\n"
+            # mpiexec has exit codes of its own above 128.
+            reason = f": {signal.strsignal(code - 128)}" if code - 128 in signal.valid_signals() else ""
+            text += f"error: the run ended with exit code {code}{reason}\n"
         if code > 128:
             # A signal to all processes ends the server too.
             self.close()

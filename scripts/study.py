@@ -122,13 +122,21 @@ def names_for(runs):
 
 
 def inputs_of(scene):
-    """The scene's file, its mesh or geometry, and its tables; those that exist."""
-    scene = Path(scene)
-    text = scene.read_text(encoding="utf-8", errors="replace") if os.path.isfile(scene) else ""
-    names = re.findall(r"""["']([^"'()]+\.\w+)["']|(?:table|spline|pchip)\(["']([^"']+)["']""", text)
-    files = [scene, *(scene.parent / name for pair in names for name in pair if name)]
-    # A text may be too long for a name.
-    return [file for file in files if os.path.exists(file)]
+    """The scene's file, and what it reads: its mesh or geometry, the files that a geometry includes, and its tables; those
+    that exist."""
+    found, open_files = [], [Path(scene)]
+    while open_files:
+        file = open_files.pop()
+        # A text may be too long for a name.
+        if file in found or not os.path.exists(file):
+            continue
+        found.append(file)
+        if os.path.isfile(file) and file.suffix in (Path(scene).suffix, ".geo"):
+            # Quotes within a string of TOML have backslashes.
+            text = file.read_text(encoding="utf-8", errors="replace").replace('\\"', "'")
+            names = re.findall(r"""["']([^"'()]+\.\w+)["']|(?:table|spline|pchip)\(["']([^"']+)["']""", text)
+            open_files += [file.parent / name for pair in names for name in pair if name]
+    return found
 
 
 def command_of(scene, folder, chosen, more):

@@ -42,6 +42,24 @@ fn a_study_runs_all_combinations_once_and_tells_their_figures() {
     directory.say(&words).fails(2, &["out/s/nothing/summary.json: No such file"]);
 }
 
+/// Runs are repeated when a table or a part of the geometry has changed, not only the scene itself.
+#[test]
+fn a_study_sees_changes_of_all_files_that_a_scene_reads() {
+    let directory = TestDirectory::new();
+    let text = directory.read("scene.toml").replace("-3*t", r#"-table(\"load.csv\", t)"#);
+    assert!(text.contains("load.csv"), "{text}");
+    directory.write("scene.toml", &text);
+    directory.write("load.csv", "0,0\n1,3\n");
+    let words = ["study", "scene.toml", "--set", "material.young=80,160", "--out", "out/s"];
+    let Some(said) = directory.say_python(&words) else { return };
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(directory.say(&words).out.starts_with("2 runs, 2 of them complete"));
+    let before = directory.read("out/s/study.csv");
+    directory.write("load.csv", "0,0\n1,2\n");
+    assert!(directory.say(&words).out.starts_with("2 runs\n"));
+    assert_ne!(directory.read("out/s/study.csv"), before);
+}
+
 /// A study of constants: their names are keys and columns, runs are called after their values or their labels, and the
 /// scene as run keeps them.
 #[test]
