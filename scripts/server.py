@@ -94,5 +94,7 @@ class Server:
     def kill(self):
         """Ends the command and the server."""
         self.send_signal(signal.SIGKILL)
-        self.own = None
+        if self.own:
+            self.own.wait()
+            self.own = None
         self.close()

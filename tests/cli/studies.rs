@@ -48,7 +48,9 @@ fn a_study_sees_changes_of_all_files_that_a_scene_reads() {
     let directory = TestDirectory::new();
     let text = directory.read("scene.toml").replace("-3*t", r#"-table(\"load.csv\", t)"#);
     assert!(text.contains("load.csv"), "{text}");
-    directory.write("scene.toml", &text);
+    directory.write("scene.toml", &(text + "# as if of \"body.geo\"\n"));
+    directory.write("body.geo", "Include \"part.geo\";\n");
+    directory.write("part.geo", "");
     directory.write("load.csv", "0,0\n1,3\n");
     let words = ["study", "scene.toml", "--set", "material.young=80,160", "--out", "out/s"];
     let Some(said) = directory.say_python(&words) else { return };
@@ -58,6 +60,9 @@ fn a_study_sees_changes_of_all_files_that_a_scene_reads() {
     directory.write("load.csv", "0,0\n1,2\n");
     assert!(directory.say(&words).out.starts_with("2 runs\n"));
     assert_ne!(directory.read("out/s/study.csv"), before);
+    directory.write("part.geo", "// changed\n");
+    assert!(directory.say(&words).out.starts_with("2 runs\n"));
+    assert!(directory.say(&words).out.starts_with("2 runs, 2 of them complete"));
 }
 
 /// A study of constants: their names are keys and columns, runs are called after their values or their labels, and the
