@@ -17,8 +17,10 @@ CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridg
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
     python3-meshio python3-matplotlib
-# The tests look at processes with ps; scipy solves the exported matrices; the others run the notebook.
-PACKAGES_TEST := procps python3-scipy python3-pandas python3-nbclient python3-ipykernel python3-tqdm
+# The tests look at processes with ps and at reports in Chromium; scipy solves the exported matrices; the others run the
+# notebook.
+PACKAGES_TEST := procps chromium-driver python3-selenium python3-scipy python3-pandas python3-nbclient python3-ipykernel \
+    python3-tqdm
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
 # GetFEM; the others are wheels in .venv-peers. scikit-sparse is CHOLMOD for scikit-fem and numpy, built from its source; from
@@ -36,7 +38,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run plot keys test nastran validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run plot keys viewer test nastran validate random compare \
     bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
@@ -67,6 +69,7 @@ help:
 	@echo 'make bounds     the proved bound on the error of u against true errors on 470 bodies (ten minutes)'
 	@echo 'make constants  the register of tuned constants, validation/CONSTANTS.md, from their comments'
 	@echo 'make architecture  the picture of the rooms of src, geo/rooms.svg, from their use lines'
+	@echo 'make viewer     the libraries of the page of a report, bundled anew (npm)'
 	@echo 'make fuzz       10 million inputs for what reads meshes, scenes, expressions (nightly Rust, cargo-fuzz)'
 	@echo 'make systems    all of this on other Debians and Ubuntus, in chroots (root, an hour); or SYSTEMS="trixie sid"'
 	@echo 'make clean      remove the build, the results and the meshes'
@@ -116,6 +119,10 @@ plot: build
 	@set -e; for run in $(patsubst %/summary.json,%,$(wildcard out/*/summary.json)); do \
 	    $(BINARY) plot $$run $(ARGS); \
 	done
+
+# The libraries of the viewer in reports, from their packages (npm); the result is checked in.
+viewer:
+	scripts/page/libraries.sh
 
 # The build reads the old page, so the new one is written beside it. Its mode stays.
 keys: build

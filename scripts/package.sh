@@ -8,7 +8,7 @@ rm -rf "$folder"
 mkdir -p "$folder"/{man,bash,zsh,fish}
 "$program" man "$folder/man"
 # The options of these commands are those of Python programs. roff(7): lines must not begin with a point, dashes are escaped.
-for name in compare info plot report study table; do
+for name in compare info plot report study table view; do
     {
         printf '.SH ARGUMENTS\n.nf\n'
         COLUMNS=80 "$program" "$name" --help | sed 's/\\/\\e/g; s/-/\\-/g; s/^[.'\'']/\\\&&/'

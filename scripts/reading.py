@@ -103,6 +103,7 @@ def with_fields(results, time, fields):
         displacement=points["displacement"][:, :2],
         zeta=points["zeta"],
         von_mises=points["von_mises"].astype(float),
+        stress=points["stress"].astype(float),
         principal=points["principal_stress"].astype(float),
         pressure=points["normal_pressure"],
         gap=points["gap"],

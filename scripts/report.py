@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Writes a run's report.html: one page with its pictures, a slider over its frames, histories,
+"""Writes a run's report.html: one page with its fields at all times, to look at in a browser, pictures, histories,
 error budget, scene and timings, which needs no other file and no network. With --pdf also report.pdf.
 
     signorini report out/lshape
@@ -9,7 +9,6 @@ import argparse
 import base64
 import html
 import io
-import json
 import multiprocessing
 import os
 import re
@@ -25,20 +24,24 @@ from string import Template
 import drawing
 from drawing import FAINT, RED, plt, wrapped
 from bars import barred, plain
-from contact_pressure import draw_evolution, draw_pressure
+from contact_pressure import draw_evolution
 from plot import PICTURES
 from histories import draw_histories
 from limits import limits_of
-from maps import draw_everything, draw_state
-from reading import evenly, read_results, states
+from maps import draw_everything
+from reading import evenly, read_results
 from report_pdf import FULL, LINE, SIZE, SPACE, pages_of
 from results import telling
 from signorini_files import check, whole
 from signorini_summaries import flag_of, folders_of
 from table import text_of
+from viewer import elements_of, frames_of
 
-# The largest numbers of frames of the slider, and of the contact pressure in time.
-FRAMES, EVOLUTION = 10, 50
+# The largest number of frames of the contact pressure in time.
+EVOLUTION = 50
+# The scripts of the viewer, in the order in which they need each other, and the pictures in the place of which it stands.
+SCRIPTS = "data.js", "locator.js", "body.js", "overlay.js", "charts.js", "viewer.js"
+IN_VIEWER = "deformed", "stress-damage", "principal-stresses"
 # The least height, inches, for the maps of the PDF on a page with other blocks.
 LEAST_MAPS = 3.0
 # The limits of the model, for the head of the report.
@@ -102,9 +105,10 @@ def all_drawn(tasks):
 def pictures(results, everything):
     """Functions that draw the pictures of the page, by name."""
     limits = limits_of([results])
+    some = [state for _, state in evenly([(state.time, state) for state in everything], EVOLUTION)]
     return {**{name: partial(draw, results, limits) for name, draw in PICTURES.items()},
             "histories": partial(draw_histories, results),
-            "contact-evolution": lambda: draw_evolution(everything, limits_of(everything))}
+            "contact-evolution": lambda: draw_evolution(some, limits_of(some))}
 
 
 def element(name, data):
@@ -123,25 +127,20 @@ def table(rows, head=()):
     return f"<table>{lines}</table>"
 
 
-def frame(state, limits):
-    """The pictures at one time; they have the same size at all times."""
-    drawn = {"state": draw_state(state, limits), "pressure": draw_pressure(state, limits)}
-    return {"moment": state.moment, **{name: encoded(figure, dpi=90) for name, figure in drawn.items()}}
-
-
-def slider(frames):
-    """Pictures of the body and of Γ_C at several times, with a slider."""
-    if len(frames) < 2:
-        return ""
-    # Nothing in a script may look like the end of it.
-    return template()[1].substitute(last=len(frames) - 1, frames=json.dumps(frames).replace("<", r"\u003c"))
-
-
-def template():
-    """The templates of the page and of its slider, from report.html beside the scripts or embedded."""
+def page_file(name):
+    """A file of the page, from the folder beside the scripts or embedded."""
     spec = find_spec("report_pdf")
-    path = os.path.join(os.path.dirname(spec.origin or ""), "report.html")
-    return [Template(text) for text in spec.loader.get_data(path).decode().split("<!-- slider -->\n")]
+    return spec.loader.get_data(os.path.join(os.path.dirname(spec.origin or ""), "page", name)).decode()
+
+
+def viewer(results, everything, limits):
+    """The element of the viewer, and its data and scripts."""
+    left_out = len(results.frames) - len(everything)
+    note = f"{len(everything)} of {len(results.frames)} frames are here; fields.pvd has all." if left_out else ""
+    own = "".join(page_file(name) for name in SCRIPTS)
+    scripts = [f"<script>{page_file('libraries.js')}</script>", elements_of(results, everything, limits),
+               f'<script>(() => {{ "use strict";\n{own}}})();</script>']
+    return Template(page_file("viewer.html")).substitute(left_out=note), "\n".join(scripts)
 
 
 def is_flagged(figure, extreme):
@@ -272,18 +271,16 @@ def errors_of(summary):
 def page(results, arguments, everything):
     """The text of the page."""
     summary, scene = results.summary, results.folder / "scene.toml"
-    chosen = [state for _, state in evenly([(state.time, state) for state in everything], FRAMES)]
-    limits = limits_of(chosen)
-    frames = {state.time: partial(frame, state, limits) for state in chosen}
-    named = pictures(results, everything)
+    named = {name: draw for name, draw in pictures(results, everything).items() if name not in IN_VIEWER}
     # The longest task first.
     tasks = {"pdf": partial(write_pdf, results.folder / "report.pdf", results, arguments, everything)}
     tasks = tasks if arguments.pdf else {}
-    drawn = all_drawn(tasks | {name: lambda draw=draw: encoded(draw()) for name, draw in named.items()} | frames)
+    drawn = all_drawn(tasks | {name: lambda draw=draw: encoded(draw()) for name, draw in named.items()})
     elements = {name: element(name, drawn[name]) for name in named}
     notes = [f"<li>{html.escape(note)}</li>" for note in summary.get("notes", [])]
     title, byline, subtitle, ending = map(html.escape, head_of(results, arguments))
-    return template()[0].substitute(
+    element_of_viewer, scripts = viewer(results, everything, limits_of(everything))
+    return Template(page_file("report.html")).substitute(
         title=title,
         byline=byline,
         model=MODEL,
@@ -293,11 +290,11 @@ def page(results, arguments, everything):
         subtitle=subtitle,
         ending=ending,
         setting=elements["setting"],
-        slider=slider([drawn[time] for time in frames]),
-        pictures="".join(elements[name] for name in (
-            "deformed", "stress-damage", "principal-stresses", "pressure")),
+        viewer=element_of_viewer,
+        scripts=scripts,
+        library_style=page_file("libraries.css"),
         histories="".join(elements[name] for name in (
-            "damage-history", "force-displacement", "contact-evolution", "histories"))
+            "pressure", "damage-history", "force-displacement", "contact-evolution", "histories"))
         or "One static solve.",
         errors=table(errors_of(summary)),
         residuals=table((key, f"{value:.1e}") for key, value in (summary.get("kkt") or {}).items()),
@@ -347,10 +344,10 @@ def write_pdf(path, results, arguments, everything):
         pages.text(made, color=FAINT)
 
 
-def main(prog=None):
-    """Returns the exit code: 2 if a folder lacks files for the report."""
+def main(prog=None, description=__doc__, shown=None):
+    """Returns the exit code: 2 if a folder lacks files for the report. `shown` gets the path of each page."""
     parser = argparse.ArgumentParser(
-        prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+        prog=prog, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
     parser.add_argument("--pdf", action="store_true", help="also report.pdf: two or three pages with values, maps and curves")
     parser.add_argument("--title", help="default: that of the scene")
@@ -361,7 +358,7 @@ def main(prog=None):
     for folder in folders_of(arguments.folders):
         with telling(folder) as problems:
             results = read_results(folder)
-            everything = states(results, evenly(results.frames, EVOLUTION))
+            everything = frames_of(results)
             path = results.folder / "report.html"
             for ending in (".html", ".pdf")[:1 + arguments.pdf]:
                 check(path.with_suffix(ending))
@@ -371,6 +368,8 @@ def main(prog=None):
             print(path)
             if arguments.pdf:
                 print(path.with_suffix(".pdf"))
+            if shown:
+                shown(path)
         failed |= bool(problems)
     return 2 if failed else 0
 

@@ -97,6 +97,7 @@ class Results:
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (n,), Pa
+    stress: np.ndarray = None  # (n, 4): σ_xx, σ_yy, σ_xy, σ_zz, Pa
     principal: np.ndarray = None  # (n, 2): σ₁ ≥ σ₂ in the plane, Pa
     pressure: np.ndarray = None  # (n,), Pa, −σ_ν
     gap: np.ndarray = None  # (n,), m, NaN off Γ_C
@@ -318,7 +319,7 @@ def without_roundoff(results):
 
     results = replace(results, zeta=zeta, gap=rounded(results.gap, deformation))
     if largest <= deformation:
-        names = ("displacement", "von_mises", "principal", "pressure")
+        names = ("displacement", "von_mises", "stress", "principal", "pressure")
         zeros = {name: 0.0 * getattr(results, name) for name in names}
         return replace(results, **zeros, curves=rounded_curves(np.inf))
     young = results.scene.get("material", {}).get("young")
@@ -327,5 +328,5 @@ def without_roundoff(results):
     stress = results.von_mises * (not rigid)
     pressures = np.maximum(results.pressure.max(), stress.max())
     noise = ROUNDING * pressures
-    return replace(results, von_mises=stress, principal=results.principal * (not rigid),
+    return replace(results, von_mises=stress, stress=results.stress * (not rigid), principal=results.principal * (not rigid),
                    pressure=rounded(results.pressure, noise), curves=rounded_curves(noise))

@@ -151,6 +151,27 @@ def draw_loads(axes, results, largest, factor):
         _draw_traction(axes, line, force * ARROW * results.size / largest, results.size, moved)
 
 
+def loads_of(results):
+    """The tractions of a state along each loaded boundary: points of the undeformed body, their displacements, the
+    tractions there, (n, 2) each, and which of them press."""
+    curves = _curves(results)
+    for (_, line), force in zip(curves, _tractions(results, curves, results.time)):
+        if force.any():
+            points, normals = _samples(line, SPACING * results.size)
+            moved, _ = _samples(line, SPACING * results.size, results.displacement_at(line))
+            yield points, moved, force, (force * normals).sum(axis=1) <= 0.0
+
+
+def boundary_colours(results):
+    """The colours of the boundaries with conditions, by name."""
+    return {name: _colour(of) for name, of in _conditions(results).items()}
+
+
+def paths_of_boundaries(results):
+    """The connected parts of boundaries: names and polylines."""
+    return _curves(results)
+
+
 def _vectors(expressions, points, time, folder):
     """The values of two expressions at points, (n, 2)."""
     return np.column_stack([evaluate(text, points, time, folder) for text in expressions])

@@ -59,8 +59,10 @@ enum Command {
     /// The old name of `plot`.
     #[command(hide = true)]
     Figures(command::ScriptArguments),
-    /// Write report.html, a page about a run, into its folder.
+    /// Write report.html, a page about a run to look at in a browser, into its folder.
     Report(command::ScriptArguments),
+    /// Write report.html and open it in the browser: fields at all times, values, curves.
+    View(command::ScriptArguments),
     /// List the contact solvers, one per line: name, tab, description.
     Solvers,
     /// Print the reference of all keys of a scene, in Markdown.
@@ -137,6 +139,7 @@ fn execute() -> u8 {
             command::script("plot", &arguments)
         }
         Command::Report(arguments) => command::script("report", &arguments),
+        Command::View(arguments) => command::script("view", &arguments),
         Command::Solvers => command::solvers(),
         Command::Keys { schema, figures } => command::keys(schema, figures),
         Command::Completions { shell } => command::completions(shell, Arguments::command()),

@@ -16,15 +16,25 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-pub(crate) const SCRIPTS: [(&str, &str); 35] = scripts! {
+pub(crate) const SCRIPTS: [(&str, &str); 37] = scripts! {
     "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions"
     "histories" "info" "limits" "lines" "maps" "meshes/abaqus" "meshes/abaqus_keywords" "meshes/by_meshio" "meshes/convert"
     "meshes/description" "meshes/msh" "meshes/nastran" "meshes/universal" "paraview_script" "paraview_view" "plot" "principal"
     "reading" "report" "report_pdf" "results" "server" "setting" "signorini_files" "signorini_results" "signorini_summaries"
-    "study" "table"
+    "study" "table" "view" "viewer"
 };
-/// The template of the report, for `report`.
-const REPORT: (&str, &str) = ("report.html", include_str!("../scripts/report.html"));
+/// Names and texts of files in scripts/page/.
+macro_rules! page {
+    ($($name:literal)*) => {
+        [$((concat!("page/", $name), include_str!(concat!("../scripts/page/", $name)))),*]
+    };
+}
+
+/// The templates, libraries and scripts of the page that `report` writes.
+const PAGE: [(&str, &str); 10] = page! {
+    "body.js" "charts.js" "data.js" "libraries.css" "libraries.js" "locator.js" "overlay.js" "report.html" "viewer.html"
+    "viewer.js"
+};
 /// The Python program that runs one of them.
 const EMBEDDED: &str = include_str!("../scripts/embedded.py");
 
@@ -70,7 +80,7 @@ pub fn python(modules: &[&str]) -> Result<OsString, String> {
 /// # Errors
 /// There is no room for temporary files.
 pub fn script_command(python: &OsStr, name: &str) -> io::Result<Command> {
-    let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain([REPORT]).collect();
+    let all: BTreeMap<_, _> = SCRIPTS.into_iter().chain(PAGE).collect();
     let mut sources = tempfile::tempfile()?;
     serde_json::to_writer(&sources, &all)?;
     sources.rewind()?;

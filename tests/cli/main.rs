@@ -26,3 +26,4 @@ mod provenance;
 mod refused;
 mod restart;
 mod serve;
+mod view;

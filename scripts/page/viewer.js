@@ -1,0 +1,315 @@
+// The state of the page, and what its controls and the pointer do.
+
+class View {
+  constructor(run, root) {
+    Object.assign(this, { run, root, frame: run.frames.length - 1, cut: [], ends: [], length: run.units.length.name });
+    this.canvas = root.querySelector("canvas");
+    this.overlay = root.querySelector("svg");
+    this.body = new Body(this.canvas, run);
+    this.drawing = new Overlay(run);
+    this.stressTop = run.stressTop;
+    this.locators = new Map();
+    this.control = name => root.querySelector(`[name=${name}]`);
+    this.fill();
+    this.charts();
+    this.listen();
+    this.fit();
+    this.show(this.frame);
+  }
+
+  get isLast() { return this.frame === this.run.frames.length - 1; }
+  get moment() { return this.run.frames[this.frame].moment; }
+  get field() { return this.control("field").value; }
+  get unit() {
+    const { label, kind, colours } = this.run.fields[this.field], { name, factor } = this.run.units[kind];
+    return { label, name, factor, colours, isStress: kind === "stress" };
+  }
+  get colours() { return this.unit.colours; }
+  get material() { return Number(this.control("material").value); }
+  get factor() { return Math.min(Math.max(Number(this.control("factor").value) || 0, 0), 1e9); }
+  get bands() { return this.control("bands").checked ? 10 : 0; }
+
+  fill() {
+    const { run } = this, options = (name, list) => {
+      this.control(name).replaceChildren(...list.map(([value, text]) => new Option(text, value)));
+    };
+    options("field", Object.entries(run.fields).map(([key, { label }]) => [key, label]));
+    options("material", [[-1, "whole body"], ...run.materialNames.map((name, k) => [k, name]).filter(([k]) => run.materials.includes(k))]);
+    this.control("material").closest("label").hidden = run.materialNames.length < 2;
+    this.control("frame").max = run.frames.length - 1;
+    this.root.querySelector(".time").hidden = run.frames.length < 2;
+    this.control("factor").value = run.automatic;
+    for (const name of ["loads", "pressure", "foundation", "mesh", "initial", "names", "marks", "directions"]) {
+      Object.defineProperty(this, name, { get: () => this.control(name).checked });
+    }
+    const has = { loads: run.largestLoad, pressure: run.topPressure, foundation: run.curves.length };
+    for (const [name, there] of Object.entries(has)) this.control(name).closest("label").hidden = !there;
+  }
+
+  charts() {
+    const { run } = this, [contact, along] = [".contact", ".along"].map(name => this.root.querySelector(name));
+    this.along = along;
+    contact.hidden = !run.curves.length;
+    this.contact = run.curves.map((curve, part) => {
+      const place = contact.appendChild(document.createElement("div")), highest = run.topPressure / run.units.stress.factor;
+      place.append(Object.assign(document.createElement("p"), { textContent: curve.title }));
+      return new Chart(place, `arc length (${run.units.length.name})`,
+        [`pressure (${run.units.stress.name})`, `gap (${run.units.length.name})`],
+        [[0, 1.08 * highest || 1], [Math.min(0, run.leastGap), 1.08 * run.largestGap || 1]]);
+    });
+  }
+
+  listen() {
+    const { root, canvas } = this;
+    root.addEventListener("input", event => {
+      if (event.target.name === "frame") { this.stop(); return this.show(Number(event.target.value)); }
+      if (["low", "high"].includes(event.target.name)) this.control("range").value = "hand";
+      this.show(this.frame);
+    });
+    const actions = {
+      play: () => this.timer ? this.stop() : this.play(), fit: () => { this.fit(); this.draw(); },
+      auto: () => { this.control("factor").value = this.run.automatic; this.show(this.frame); },
+      one: () => { this.control("factor").value = 1; this.show(this.frame); },
+      line: () => this.startLine(), csv: () => this.saveLine(), png: () => this.savePicture("png"), svg: () => this.savePicture("svg"),
+    };
+    root.addEventListener("click", event => { actions[event.target.dataset?.action]?.(); });
+    new ResizeObserver(() => { this.fit(); this.draw(); }).observe(canvas.parentElement);
+    canvas.addEventListener("wheel", event => {
+      event.preventDefault();
+      this.zoomBy(Math.exp(-0.0015 * event.deltaY), this.pixel(event));
+    }, { passive: false });
+    const held = new Map();
+    canvas.addEventListener("pointerdown", event => {
+      canvas.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, this.pixel(event));
+      if (held.size === 1) this.pressed = this.pixel(event);
+    });
+    canvas.addEventListener("pointermove", event => {
+      const now = this.pixel(event), before = held.get(event.pointerId);
+      if (before) {
+        const others = [...held].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
+        const apart = at => Math.hypot(at[0] - others[0][0], at[1] - others[0][1]) || 1;
+        if (others.length) this.zoomBy(apart(now) / apart(before), others[0]);
+        else this.moveBy([now[0] - before[0], now[1] - before[1]]);
+        held.set(event.pointerId, now);
+      }
+      this.tell(now);
+    });
+    for (const kind of ["pointerup", "pointercancel"]) canvas.addEventListener(kind, event => {
+      const now = this.pixel(event);
+      if (kind === "pointerup" && this.pressed && Math.hypot(now[0] - this.pressed[0], now[1] - this.pressed[1]) < 4) this.click(now);
+      held.delete(event.pointerId);
+    });
+    canvas.addEventListener("dblclick", () => { this.fit(); this.draw(); });
+    root.addEventListener("keydown", event => {
+      if (event.target.matches("input, select, button")) return;
+      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+      if (step) { this.stop(); this.show(Math.min(Math.max(this.frame + step, 0), this.run.frames.length - 1)); }
+      if (event.key === " ") { event.preventDefault(); actions.play(); }
+    });
+  }
+
+  pixel(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  // Pixels of a place of the picture, and back.
+  screen([x, y]) {
+    return [this.width / 2 + this.zoom * (x - this.centre[0]), this.height / 2 - this.zoom * (y - this.centre[1])];
+  }
+  place([x, y]) {
+    return [this.centre[0] + (x - this.width / 2) / this.zoom, this.centre[1] - (y - this.height / 2) / this.zoom];
+  }
+
+  fit() {
+    const { clientWidth, clientHeight } = this.canvas.parentElement, [[left, bottom], [right, top]] = this.run.box;
+    Object.assign(this, { width: clientWidth, height: clientHeight, centre: [(left + right) / 2, (bottom + top) / 2] });
+    this.zoom = Math.max(Math.min((clientWidth - 240) / (right - left || 1), (clientHeight - 120) / (top - bottom || 1)), 1e-12);
+    this.centre[0] += 30 / this.zoom;
+  }
+
+  zoomBy(by, [x, y]) {
+    const fixed = this.place([x, y]);
+    this.zoom *= by;
+    const now = this.place([x, y]);
+    this.centre = this.centre.map((of, axis) => of + fixed[axis] - now[axis]);
+    this.draw();
+  }
+
+  moveBy([dx, dy]) {
+    this.centre = [this.centre[0] - dx / this.zoom, this.centre[1] + dy / this.zoom];
+    this.draw();
+  }
+
+  // Shows a frame with the chosen field.
+  show(frame) {
+    this.frame = frame;
+    this.control("frame").value = frame;
+    this.root.querySelector("output.moment").value = this.moment;
+    this.shown = this.run.values(frame, this.field);
+    this.body.move(frame);
+    this.body.colour(this.shown);
+    this.range = this.chosenRange();
+    this.contact.forEach((chart, part) => chart.show(contactData(this.run, frame, part)));
+    this.showLine();
+    this.draw();
+    if (this.pointed) this.tell(this.pointed);
+  }
+
+  chosenRange() {
+    const kind = this.control("range").value, { factor } = this.unit, { run, field, material, frame } = this;
+    const all = [...run.frames.keys()], key = `${field} ${material}`;
+    if (kind === "frame") return this.written(run.range(field, [frame], material));
+    this.ranges ??= new Map();
+    if (!this.ranges.has(key)) this.ranges.set(key, run.range(field, all, material));
+    const found = { ...this.ranges.get(key) };
+    if (kind !== "hand") return this.written(found);
+    const [low, high] = ["low", "high"].map(name => Number(this.control(name).value) * factor);
+    return { ...found, low, high };
+  }
+
+  // Writes the range into its fields, from which one goes on by hand.
+  written(range) {
+    for (const name of ["low", "high"]) this.control(name).value = short(range[name] / this.unit.factor);
+    return range;
+  }
+
+  draw() {
+    cancelAnimationFrame(this.asked);
+    this.asked = requestAnimationFrame(() => {
+      this.body.draw({ ...this.settings(), mesh: this.mesh });
+      this.overlay.innerHTML = this.drawing.draw(this);
+    });
+  }
+
+  settings() {
+    const { centre, zoom, width, height, factor, material, colours, bands, range } = this;
+    return { centre, zoom, width, height, factor, material, colours, bands, range };
+  }
+
+  // The locator of the shown state, or of the undeformed body.
+  locator(factor = this.factor) {
+    const key = factor ? `${this.frame} ${factor}` : "undeformed", { locators } = this;
+    if (!locators.has(key)) {
+      for (const old of locators.keys()) if (old !== "undeformed") locators.delete(old);
+      locators.set(key, new Locator(this.run, factor ? this.run.places(this.frame, factor) : this.run.nodes));
+    }
+    return locators.get(key);
+  }
+
+  // Says what is under the pointer: place in the undeformed body, value, material.
+  tell(pixel) {
+    this.pointed = pixel;
+    const spot = this.timer ? null : this.locator().find(this.place(pixel), this.material), { run } = this;
+    this.root.querySelector("output.value").value = spot ? this.said(spot) : "";
+  }
+
+  said(spot) {
+    const { run, unit } = this, at = [run.x, run.y].map((of, axis) => run.interpolate(of, spot) + run.origin[axis]);
+    const value = run.interpolate(this.shown, spot) / unit.factor, name = run.materialNames[run.materials[spot.element]];
+    // Stresses have five digits of the largest one.
+    const noise = unit.isStress ? 1e-7 * run.stressTop / unit.factor : 0;
+    const digits = (x, least = 0) => Math.abs(x) < least ? "0" : String(Number(x.toPrecision(6)));
+    const material = run.materialNames.length > 1 ? `, ${name}` : "";
+    return `(${at.map(x => digits(x)).join(", ")}) ${run.units.length.name}: ${unit.label} ${digits(value, noise)} ${unit.name}${material}${this.contactAt(spot)}`;
+  }
+
+  // Pressure and gap at the nearest node of Γ_C, if that is a node of the element.
+  contactAt({ element, parts }) {
+    const { run } = this, corner = parts.indexOf(Math.max(...parts)), node = run.elements[run.order * element + corner];
+    for (const [c, { nodes }] of run.curves.entries()) {
+      const k = nodes.indexOf(node), { pressure, gap } = run.frames[this.frame].contact[c];
+      if (k >= 0) return `; at the contact node pressure ${short(pressure[k] / run.units.stress.factor)} ${run.units.stress.name}, gap ${short(gap[k])} ${run.units.length.name}`;
+    }
+    return "";
+  }
+
+  // One click begins a line, the next one ends it.
+  startLine() {
+    this.ends = [];
+    this.cut = [];
+    this.isAsking = true;
+    this.root.querySelector("output.hint").value = "Click on the body where the line begins, and where it ends.";
+  }
+
+  click(pixel) {
+    if (!this.isAsking) return;
+    const spot = this.locator().find(this.place(pixel));
+    if (!spot) return;
+    this.ends.push([this.run.x, this.run.y].map(of => this.run.interpolate(of, spot)));
+    if (this.ends.length < 2) return;
+    this.isAsking = false;
+    this.root.querySelector("output.hint").value = "";
+    this.cut = cutBetween(this.run, this.locator(0), ...this.ends);
+    this.showLine();
+    this.draw();
+  }
+
+  lineData() {
+    const { factor } = this.unit;
+    return [this.cut.map(of => of.distance), this.cut.map(({ spot }) => spot ? this.run.interpolate(this.shown, spot) / factor : null)];
+  }
+
+  showLine() {
+    this.along.hidden = !this.cut.length;
+    if (!this.cut.length) return;
+    const label = `${this.unit.label}${this.unit.name ? ` (${this.unit.name})` : ""}`, length = this.length;
+    if (this.lineLabel !== label) {
+      this.line?.remove();
+      this.line = new Chart(this.along.querySelector("div"), `distance (${length})`, [label], [null]);
+      this.lineLabel = label;
+    }
+    const [from, to] = this.ends.map(end => `(${end.map((x, axis) => short(x + this.run.origin[axis])).join(", ")})`);
+    this.along.querySelector("p").textContent = `${this.unit.label} from ${from} to ${to}, ${this.moment}`;
+    this.line.show(this.lineData());
+  }
+
+  saveLine() {
+    const [distances, values] = this.lineData(), { origin } = this.run;
+    const rows = this.cut.map(({ at }, k) => [distances[k], ...at.map((x, axis) => x + origin[axis]), values[k] ?? ""].join(","));
+    saved(`${this.run.name}-line.csv`, new Blob([["distance,x,y," + this.field, ...rows, ""].join("\n")], { type: "text/csv" }));
+  }
+
+  // The picture as text: the coloured body as an image, the rest as vectors.
+  picture() {
+    this.body.draw({ ...this.settings(), mesh: this.mesh });
+    const { width, height } = this;
+    return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" font-family="sans-serif" font-size="12">`
+      + `<image href="${this.canvas.toDataURL()}" width="${width}" height="${height}"/>${this.drawing.draw(this)}</svg>`;
+  }
+
+  savePicture(kind) {
+    const blob = new Blob([this.picture()], { type: "image/svg+xml" }), name = `${this.run.name}-${this.field}`;
+    if (kind === "svg") return saved(`${name}.svg`, blob);
+    const image = new Image();
+    image.onload = () => {
+      const canvas = Object.assign(document.createElement("canvas"), { width: 2 * this.width, height: 2 * this.height });
+      canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
+      canvas.toBlob(found => saved(`${name}.png`, found));
+    };
+    image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(this.picture())}`;
+  }
+
+  play() {
+    const last = this.run.frames.length - 1;
+    if (last < 1) return;
+    if (this.frame === last) this.frame = -1;
+    this.root.querySelector("[data-action=play]").textContent = "stop";
+    this.timer = setInterval(() => {
+      this.show(this.frame + 1);
+      if (this.frame === last) this.stop();
+    }, Math.max(40, Math.min(250, 6000 / last)));
+  }
+
+  stop() {
+    clearInterval(this.timer);
+    this.timer = null;
+    this.root.querySelector("[data-action=play]").textContent = "play";
+  }
+}
+
+const root = document.getElementById("viewer");
+Run.read().then(run => { root.view = new View(run, root); }).catch(error => {
+  root.querySelector("output.hint").value = `This browser cannot show the fields: ${error.message}.`;
+});
