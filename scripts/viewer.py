@@ -9,6 +9,7 @@ import numpy as np
 
 from drawing import stress_unit
 from reading import evenly, states
+from results import ROUNDING
 from setting import boundary_colours, loads_of, paths_of_boundaries
 from signorini_results import paths
 
@@ -47,7 +48,9 @@ def packed(*arrays):
 def columns(state):
     """The fields of a state, a row each: u_x, u_y, 1 − ζ, σ_xx, σ_yy, σ_xy, σ_zz; then the pressures and the gaps of each
     curve of Γ_C."""
-    fields = np.vstack((state.displacement.T, 1.0 - state.zeta, state.stress.T))
+    # Rounding errors are no stress.
+    stress = np.where(np.abs(state.stress) > ROUNDING * state.von_mises.max(), state.stress, 0.0)
+    fields = np.vstack((state.displacement.T, 1.0 - state.zeta, stress.T))
     contact = [values for curve in state.curves for values in (curve.pressure, curve.gap)]
     return with_digits(np.concatenate([fields.ravel(), *contact]))
 

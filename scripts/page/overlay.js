@@ -140,7 +140,9 @@ class Overlay {
     if (!view.marks) return "";
     const { least, largest } = this.run.extremes(view.field, view.frame, view.material);
     const halo = 'paint-order="stroke" stroke="#fff" stroke-width="3"';
-    const shown = least.value === largest.value ? [] : [["min", least], ["max", largest]];
+    // Equal up to rounding: the field has no extremes.
+    const isFlat = largest.value - least.value <= 1e-6 * Math.max(Math.abs(least.value), Math.abs(largest.value));
+    const shown = isFlat ? [] : [["min", least], ["max", largest]];
     const extremes = shown.map(([word, { value, node }]) => {
       const [x, y] = this.node(view, node);
       return `<circle cx="${x}" cy="${y}" r="4" fill="none" stroke="${INK}" stroke-width="1.4"/>`
