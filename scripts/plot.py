@@ -40,7 +40,9 @@ from reading import evenly, read_results, states
 from results import telling
 from setting import draw_setting
 from signorini_files import check, whole
-from signorini_summaries import folders_of
+from signorini_summaries import folders_of, is_study, summary_or_error
+from study_pictures import drawn
+from table import names_of
 
 PICTURES = {
     "setting": draw_setting,
@@ -85,6 +87,10 @@ def arguments_of(prog):
         "only these pictures, by the names above"))
     parser.add_argument("--together", action="store_true", help=(
         "only force-displacement-together, the forces of all runs in one picture, into the first folder"))
+    parser.add_argument("--figure", type=names_of, metavar="NAME,…", help=(
+        "only these figures of a study, or of several runs, over the values that they vary, with the numbers as CSV"))
+    parser.add_argument("--over", metavar="KEY", help=(
+        "the varied key below the curves of --figure, or run (default: the first; the others have a curve for each value)"))
     parser.add_argument("--abscissa", metavar="COLUMN", help=(
         "column of history.csv over which force-displacement draws the forces: time, displacement_max, work, …"))
     parser.add_argument("--range", type=numbers(2), metavar="A,B", help="stresses at the ends of the colour bars, Pa; compression is positive")
@@ -179,7 +185,13 @@ def main(prog=None):
     arguments = arguments_of(prog)
     drawing.use(width=arguments.width, titles=not arguments.no_title, contours=arguments.contours,
                 abscissa=arguments.abscissa, range=arguments.range)
+    target = arguments.folders[0]
     arguments.folders = folders_of(arguments.folders)
+    if arguments.figure:
+        summaries = list(map(summary_or_error, arguments.folders))
+        target = target if is_study(target) else arguments.folders[0]
+        return 0 if drawn(arguments.folders, summaries, arguments.figure, target, over=arguments.over,
+                          formats=arguments.format) else 2
     if arguments.line or arguments.along:
         with telling(arguments.folders[0]) as problems:
             for path in draw_curves(arguments):
