@@ -59,13 +59,13 @@ def draw_studies(folders, summaries, names, target, over=None, settings=None, fo
     if not complete:
         raise ResultError("nothing to draw: no run has results")
     folders, summaries, settings = ([of[k] for k in complete] for of in (folders, summaries, settings))
+    settings = [{name: _text(of[name]) if of.get(name) else _value_in(folder, name) for name in varied(settings)}
+                for folder, of in zip(folders, settings)]
     keys = varied(settings)
     if over not in (None, "run", *keys):
         raise ResultError(f"--over {over}: the runs do not differ in it; choose {', '.join([*keys, 'run'])}")
     key = over or next(iter(keys), "run")
     others = [name for name in keys if name != key]
-    settings = [{name: _text(of[name]) if of.get(name) else _value_in(folder, name) for name in keys}
-                for folder, of in zip(folders, settings)]
     if failed:
         print(f"note: the pictures lack the failed runs {', '.join(failed)}", file=sys.stderr)
     for name, (table, *pictures) in paths_of(target, names, formats).items():
