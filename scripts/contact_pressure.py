@@ -44,6 +44,10 @@ def draw_pressure(results, limits, figure=None):
         if k % count == 0:
             above.set_ylabel(f"pressure ({unit})")
             below.set_ylabel(f"gap{times_power(power, results.units['length'])}")
+    if not OPTIONS.titles and results.active:
+        for face, words in ((BLUE, "in contact"), ("white", "open")):
+            axes[0].scatter([], [], s=20, facecolor=face, edgecolor=BLUE, linewidth=0.8, label=words)
+        axes[0].legend(loc="best", fontsize="small", handletextpad=0.2)
     for k in range(len(curves), lines * count):
         for part in (0, 1):
             axes[(2 * (k // count) + part) * count + k % count].remove()
@@ -146,7 +150,7 @@ def draw_evolution(states, limits):
     factor, unit = stress_unit(limits.pressure, first.units)
     text = f"contact pressure ({unit}) in {len(states)} frames; white: open"
     figure, rows = canvas([column], [(top, max(high, 1.0), bottom)] * len(curves), headline(last, text),
-                          _names(curves) if OPTIONS.titles else ())
+                          _names(curves) if OPTIONS.titles else [f"contact pressure ({unit}); white: open"])
     times = np.array([state.time for state in states])
     for k, (curve, axes) in enumerate(zip(curves, rows)):
         s, label = along(curve.points, first.units)

@@ -265,13 +265,14 @@ def draw_body(axes, results, factor):
 
 
 def draw_colourbar(axes, image, extend="neither"):
-    """Draws a colour bar as high as the map."""
+    """Draws a colour bar as high as the map; returns it."""
     width, height = _size_of(axes)
     place = axes.inset_axes([1.0 + 0.8 * em() / width, 0.0, em() / width, 1.0])
     ticks = MaxNLocator(int(np.clip(height / (2.5 * em()), 1, 6)), steps=[1, 2, 5, 10])
     bar = axes.figure.colorbar(image, cax=place, extend=extend, ticks=ticks)
     bar.outline.set_linewidth(0.5)
     bar.formatter.set_useOffset(False)
+    return bar
 
 
 def stress_unit(largest, units):
