@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import signorini_results
-from drawing import INK, em, legend, plot, room_for_legend, wrapped
+from drawing import INK, colours, em, legend, plot, room_for_legend, wrapped
 from reading import open_run
 from results import ResultError, write_table
 from signorini_files import whole
@@ -51,8 +51,8 @@ def _draw(curves, abscissa, quantity, units):
     """A plot of curves: their labels, places and values."""
     below = room_for_legend([label for label, *_ in curves])
     figure, axes = plot(below=below)
-    for label, places, values in curves:
-        axes.plot(places, values, label=label, linewidth=1.3)
+    for (label, places, values), colour in zip(curves, colours(len(curves))):
+        axes.plot(places, values, label=label, linewidth=1.3, color=colour)
     unit = units.get(UNITS.get(quantity, "stress"), "")
     words = quantity.replace("_", " ").replace("mises", "Mises stress")
     axes.set_ylabel(f"{words} ({unit})" if unit else words)
@@ -79,7 +79,9 @@ def differences(names):
     names = [os.fsencode(name).decode(errors="replace") for name in names]
     parts = [name.split("__") for name in names]
     common = set(parts[0]).intersection(*parts[1:]) if len(names) > 1 else ()
-    return ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
+    found = ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
+    # Legends leave out labels that begin with an underscore.
+    return [f" {name}" if name.startswith("_") else name for name in found]
 
 
 def _values(frame, arguments, quantity):

@@ -3,7 +3,7 @@
 table.
 
     signorini study geo/lshape.toml --set material.young=1e5,2e5,4e5 --set mesh.size=0.5,0.25
-    signorini study geo/lshape.toml --cases cases.csv
+    signorini study geo/lshape.toml --cases cases.csv --plot zeta_min,foundation.force_y
 
 Each row of cases.csv is a run; the columns are keys or names of constants, and an empty cell leaves a key as it is.
 Each run has a folder below OUT, named by its values, or by the column `label`; OUT/study.csv is the table. A study

@@ -45,7 +45,7 @@ def drawn(folders, summaries, names, target, **options):
     """Draws the pictures and prints their paths; returns whether all are drawn. See `draw_studies`."""
     known = [name for name in names if not refused([name], list(filter(None, summaries)))]
     with telling() as problems:
-        for path in draw_studies(folders, summaries, known, target, **options):
+        for path in draw_studies(folders, summaries, known, target, **options) if known else ():
             print(path, flush=True)
     return known == names and not problems
 
@@ -152,7 +152,7 @@ def _draw(name, key, others, rows, unit, summaries, left_out):
     figure, axes = plot(caption, below=below + lower)
     for (text, points), colour in zip(curves.items(), colours(len(curves))):
         x, y, bars, marks = map(np.array, zip(*points))
-        axes.plot(x, y, color=colour, linewidth=1.3, label=text or "_")
+        axes.plot(x, y, color=colour, linewidth=1.3, label=f" {text}" if text.startswith("_") else text or "_")
         if (known := bars > 0.0).any():
             axes.errorbar(x[known], y[known], yerr=bars[known], fmt="none", ecolor=colour, elinewidth=1.0, capsize=3.0)
         for at, value, mark in zip(x, y, marks):

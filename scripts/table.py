@@ -3,6 +3,7 @@
 summary.json with their units and error bars.
 
     signorini table out/*/ --columns end_time,stopped_at,clamp.force_y,displacement_max.governing
+    signorini table out/lshape-study --latex
 """
 
 import argparse
