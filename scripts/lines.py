@@ -11,7 +11,7 @@ from drawing import INK, colours, em, legend, plot, room_for_legend, wrapped
 from reading import open_run
 from results import ResultError, write_table
 from signorini_files import whole
-from signorini_summaries import units_of
+from signorini_summaries import settings_of, units_of, varied
 
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length", **dict.fromkeys(signorini_results.STRAINS, "")}
 
@@ -24,7 +24,7 @@ def draw_curves(arguments):
     folder, units = runs[0].folder, units_of(runs[0].summary)
     for quantity in arguments.quantity or ["von_mises"]:
         curves, rows = [], []
-        for run, name in zip(runs, differences([run.folder.name for run in runs])):
+        for run, name in zip(runs, names_of(runs)):
             frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
             if missing := [f"{time:g}" for time in arguments.times or [] if not np.isclose(time, list(frames)).any()]:
                 print(f"{run.folder}: no frame at t = {', '.join(missing)}: the nearest are drawn", file=sys.stderr)
@@ -71,6 +71,16 @@ def _way(run, arguments):
     parts = run.parts(arguments.along)
     ends = [" → ".join(f"({x:.4g}, {y:.4g})" for x, y in part[[0, -1]]) for part in parts]
     return f"{arguments.along}: {', '.join(ends[:3])}{' …' * (len(ends) > 3)}"
+
+
+def names_of(runs):
+    """Names of runs for a legend: the values in which they differ, if their folders are called after these, else the folders."""
+    settings, folders = settings_of([run.summary for run in runs]), [run.folder.name for run in runs]
+    keys = varied(settings)
+    if not keys or any("=" not in folder for folder in folders):
+        return differences(folders)
+    return [", ".join(f"{key.rpartition('.')[2]} = {of[key]}" for key in keys if key in of) or folder
+            for of, folder in zip(settings, folders)]
 
 
 def differences(names):

@@ -36,7 +36,7 @@ from animation import animate
 from contact_pressure import draw_evolution, draw_pressure, draw_pressures
 from histories import draw_damage_history, draw_force_displacement, draw_forces
 from limits import box_of, limits_of
-from lines import differences, draw_curves
+from lines import draw_curves, names_of as names_of_runs
 from maps import draw_deformed, draw_mesh, draw_stress_and_damage
 from paraview_script import write_script
 from principal import draw_principal
@@ -195,12 +195,12 @@ def draw_together(runs, arguments):
         raise ResultError(f"--together draws {' and '.join(TOGETHER)}; name one of them after --only")
     if len({tuple(run.units.items()) for run in runs}) > 1:
         raise ResultError("the runs have different units; draw those with the same units together")
-    names, drawn = differences([run.folder.name for run in runs]), []
+    names, found = names_of_runs(runs), []
     for name in chosen:
         figure = TOGETHER[name](runs, names)
-        drawn += [name] * (figure is not None)
+        found += [name] * (figure is not None)
         save(figure, runs[0], f"{name}-together", arguments.format)
-    if not drawn:
+    if not found:
         raise ResultError("nothing to draw together: forces need runs with time steps, and pressures runs with a foundation")
 
 

@@ -175,7 +175,16 @@ fn files_and_links_of_the_user_stay_under_every_writer() {
         (&["run", "scene.toml", "--out", "mine"], "mine", results),
         (&["export", "scene.toml", "--out", "mine"], "mine", made.names("matrices")),
         (
-            &["study", "scene.toml", "--set", "time.end=0.1,0.2", "--out", "mine", "--plot", "work"],
+            &[
+                "study",
+                "scene.toml",
+                "--set",
+                "time.end=0.1,0.2",
+                "--out",
+                "mine",
+                "--plot",
+                "work",
+            ],
             "mine",
             names(".locks study.csv curves_work.csv curves_work.png"),
         ),

@@ -55,7 +55,7 @@ assert abs(found.M.sum() - 1) < 1e-12 and len(found.triangles) == 32
 try:
     run(scene, out='out/dict', material={'young': -1})
 except RuntimeError as error:
-    assert 'material.young' in str(error) and str(error).startswith('the scene:'), error
+    assert 'material.young' in str(error) and str(error).startswith('the scene'), error
 assert path.animate('damage', 'damage.gif', rate=10) == path.animate('stress_yy', 'damage.gif', factor=2)
 try:
     path.animate('damage', 'scene.toml')

@@ -332,7 +332,8 @@ fn static_runs_are_drawn_together() {
 fn forces_are_drawn_over_the_displacement_of_the_driven_boundary() {
     let directory = TestDirectory::new();
     let scene = directory.read("scene.toml");
-    let clamp = scene.replace("traction = [\"0\", \"-3*t\"]", "displacement = [\"free\", \"-v*t\"]");
+    let clamp =
+        scene.replace("traction = [\"0\", \"-3*t\"]", "displacement = [\"free\", \"-v*t\"]");
     let base = scene.replace("gap = \"0\"", "displacement = [\"free\", 0]");
     let plate = base.replace("traction = [\"0\", \"-3*t\"]", "gap = \"0.005 - v*t\"");
     for (name, scene) in [("load", &scene), ("clamp", &clamp), ("plate", &plate)] {

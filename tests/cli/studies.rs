@@ -136,7 +136,8 @@ fn a_study_varies_constants_and_cases_have_labels() {
 fn a_study_is_drawn_over_its_values() {
     let directory = TestDirectory::new();
     let study = ["study", "scene.toml", "--out", "out/s", "--plot", "work,bottom.force_y"];
-    let sets = ["--set", "material.poisson=0.3,0.7,0.1", "--set", "boundary.top.traction=[0, -1],[0, -3]"];
+    let sets =
+        ["--set", "material.poisson=0.3,0.7,0.1", "--set", "boundary.top.traction=[0, -1],[0, -3]"];
     let Some(said) = directory.say_python(&[&study[..], &sets].concat()) else { return };
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("lack the failed runs poisson=0.7"), "{said:?}");
@@ -154,9 +155,10 @@ fn a_study_is_drawn_over_its_values() {
     assert_eq!(said.out, "out/s/curves_work.csv\nout/s/curves_work.svg\n", "{said:?}");
     let picture = directory.read("out/s/curves_work.svg");
     assert!(picture.contains("[0, -3]") && picture.contains("material.poisson = 0.1"), "{said:?}");
-    directory.say(&[&plot[..], &["--over", "material.young"]].concat()).fails(2, &[
-        "--over material.young: the runs do not differ in it; choose material.poisson",
-    ]);
+    directory.say(&[&plot[..], &["--over", "material.young"]].concat()).fails(
+        2,
+        &["--over material.young: the runs do not differ in it; choose material.poisson"],
+    );
     let wrong = directory.say(&["plot", "out/s", "--figure", "wrok"]);
     wrong.fails(2, &["no summary has wrok; did you mean work"]);
     // The table of the study's folder is that of its runs.
