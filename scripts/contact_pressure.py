@@ -3,8 +3,8 @@
 import numpy as np
 
 from drawing import (
-    AROUND_PLOTS, BAR, BLUE, FAINT, OPTIONS, along, canvas, draw_colourbar, em, headline, power_of, stress_unit,
-    times_power, wide,
+    AROUND_PLOTS, BAR, BLUE, FAINT, NARROWEST, OPTIONS, along, canvas, colours, draw_colourbar, em, headline, legend,
+    power_of, room_for_legend, stress_unit, times_power, wide,
 )
 
 # The least width of a panel, in the size of letters; panels of many boundaries stand in several rows.
@@ -44,9 +44,42 @@ def draw_pressure(results, limits, figure=None):
         if k % count == 0:
             above.set_ylabel(f"pressure ({unit})")
             below.set_ylabel(f"gap{times_power(power, results.units['length'])}")
+    if not OPTIONS.titles and results.active:
+        for face, words in ((BLUE, "in contact"), ("white", "open")):
+            axes[0].scatter([], [], s=20, facecolor=face, edgecolor=BLUE, linewidth=0.8, label=words)
+        axes[0].legend(loc="best", fontsize="small", handletextpad=0.2)
     for k in range(len(curves), lines * count):
         for part in (0, 1):
             axes[(2 * (k // count) + part) * count + k % count].remove()
+    return figure
+
+
+def draw_pressures(runs, names, figure=None):
+    """The pressures of several runs along each part of each contact boundary, a panel each. None without contact boundaries."""
+    panels = {}
+    for k, results in enumerate(runs):
+        for title, curve in zip(_names(results.curves), results.curves):
+            panels.setdefault(title, []).append((k, curve))
+    if not panels:
+        return None
+    left, right, top, bottom = (em() * of for of in AROUND_PLOTS)
+    below, colour = room_for_legend(names, always=True), colours(len(runs))
+    high = max(min(0.6 * wide(NARROWEST) - top - bottom, 8.0 / len(panels)), 1.0)
+    factor, unit = stress_unit(max(curve.pressure.max() for of in panels.values() for _, curve in of), runs[0].units)
+    moments = dict.fromkeys(results.moment for results in runs)
+    caption = f"contact pressure{f' at {runs[0].moment}' * (len(moments) == 1)}"
+    figure, rows = canvas([(left, wide(NARROWEST) - left - right, right)], [(top, high, bottom)] * len(panels), caption,
+                          list(panels) if OPTIONS.titles or len(panels) > 1 else (), below, figure)
+    for axes, curves in zip(rows, panels.values()):
+        for k, curve in curves:
+            axes.plot(along(curve.points, {"length": ""})[0], curve.pressure / factor, color=colour[k], linewidth=1.4)
+        axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=1)
+        ways = list(dict.fromkeys(along(curve.points, runs[0].units)[1] for _, curve in curves))
+        axes.set_xlabel(ways[0] if len(ways) == 1 else f"along {curves[0][1].name} ({runs[0].units['length']})")
+        axes.set_ylabel(f"pressure ({unit})")
+    for name, of in zip(names, colour):
+        rows[-1].plot([], [], color=of, label=name)
+    legend(rows[-1], below)
     return figure
 
 
@@ -117,7 +150,7 @@ def draw_evolution(states, limits):
     factor, unit = stress_unit(limits.pressure, first.units)
     text = f"contact pressure ({unit}) in {len(states)} frames; white: open"
     figure, rows = canvas([column], [(top, max(high, 1.0), bottom)] * len(curves), headline(last, text),
-                          _names(curves) if OPTIONS.titles else ())
+                          _names(curves) if OPTIONS.titles else [f"contact pressure ({unit}); white: open"])
     times = np.array([state.time for state in states])
     for k, (curve, axes) in enumerate(zip(curves, rows)):
         s, label = along(curve.points, first.units)

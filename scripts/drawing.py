@@ -94,6 +94,11 @@ def em():
     return plt.rcParams["font.size"] / 72
 
 
+def colours(count):
+    """Colours of curves that are all different."""
+    return [f"C{k}" for k in range(count)] if count <= 10 else [plt.cm.viridis(k / count) for k in range(count)]
+
+
 @lru_cache(maxsize=4096)
 def width_of(text, size=None):
     """The width of a text of this size, points, in inches."""
@@ -260,13 +265,14 @@ def draw_body(axes, results, factor):
 
 
 def draw_colourbar(axes, image, extend="neither"):
-    """Draws a colour bar as high as the map."""
+    """Draws a colour bar as high as the map; returns it."""
     width, height = _size_of(axes)
     place = axes.inset_axes([1.0 + 0.8 * em() / width, 0.0, em() / width, 1.0])
     ticks = MaxNLocator(int(np.clip(height / (2.5 * em()), 1, 6)), steps=[1, 2, 5, 10])
     bar = axes.figure.colorbar(image, cax=place, extend=extend, ticks=ticks)
     bar.outline.set_linewidth(0.5)
     bar.formatter.set_useOffset(False)
+    return bar
 
 
 def stress_unit(largest, units):
@@ -325,16 +331,30 @@ def legend_columns(labels, width):
     return max(1, min(len(labels), int(width / (widest + 3 * em()))))
 
 
-def legend(axes, below, **style):
-    """A legend inside axes, or in the place `below` them, inches."""
+def legend(axes, below, lower=0.0, **style):
+    """A legend inside axes, or in the place `below` them, and below further `lower` lines of ticks, inches."""
     if not below:
         axes.legend(loc="best", **style)
         return
     size, left = _size_of(axes), (0.6 - AROUND_MAPS[0]) * em()
     columns = legend_columns(axes.get_legend_handles_labels()[1], wide(NARROWEST))
-    axes.legend(loc="upper left", bbox_to_anchor=(left / size[0], -3.8 * em() / size[1]), ncols=columns,
+    axes.legend(loc="upper left", bbox_to_anchor=(left / size[0], -(3.8 * em() + lower) / size[1]), ncols=columns,
                 borderaxespad=0.0, borderpad=0.0, fontsize="small", labelspacing=0.3, handletextpad=0.8,
                 columnspacing=1.0, **{"handlelength": 1.6, **style})
+
+
+def drawn_ticks(axis, ticks):
+    """Sets ticks of a logarithmic axis. A label that would touch the one before is left out."""
+    is_x, low_high = axis.axis_name == "x", np.log(axis.get_view_interval())
+    room = _size_of(axis.axes)[0 if is_x else 1] / np.ptp(low_high)
+    labels, end = [], -np.inf
+    for tick in ticks:
+        text, middle = f"{tick:g}", room * np.log(tick)
+        half = 0.5 * (width_of(text) + 0.6 * em() if is_x else LINE * em())
+        labels.append(text if middle - half >= end else "")
+        end = middle + half if labels[-1] else end
+    axis.set_ticks([], minor=True)
+    axis.set_ticks(ticks, labels)
 
 
 def power_of(largest):

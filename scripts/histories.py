@@ -1,16 +1,16 @@
 """Pictures of quantities in time, from history.csv."""
 
-from itertools import cycle
-
 import numpy as np
 
 from drawing import (
-    AROUND_PLOTS, BLUE, FAINT, OPTIONS, RED, canvas, em, headline, legend, plot, power_of, room_for_legend,
+    AROUND_PLOTS, BLUE, FAINT, OPTIONS, RED, canvas, colours, em, headline, legend, plot, power_of, room_for_legend,
     times_power,
 )
+from driven import driven_boundary
 from results import ROUNDING, UNDAMAGED, ResultError
 
-DASHES = "-", (0, (4, 3)), (0, (1, 2))
+# The styles of lines: a figure has the same one in all runs.
+DASHES = "-", (0, (4, 3)), (0, (1, 2)), (0, (6, 2, 1, 2)), (0, (8, 2, 1, 2, 1, 2))
 
 
 def draw_damage_history(results, _limits=None, figure=None):
@@ -44,42 +44,55 @@ def draw_force_displacement(results, _limits=None, figure=None):
 
 def draw_forces(runs, names, figure=None):
     """Draws the force of each support of one or more runs, its component along the direction that it has where it is
-    largest, over a column of history.csv. By default this is the largest displacement if it grows in all steps of all
-    runs, else the time."""
+    largest. The abscissa is a column of history.csv if one is asked for; else the displacement of the driven boundary, if all runs
+    have one; else the largest displacement, if it grows in all steps of all runs; else the time."""
+    kept = [k for k, results in enumerate(runs) if len(results.history["time"]) > 2]
+    runs, names = [runs[k] for k in kept], [names[k] for k in kept]
     forces = [_forces(results.history) for results in runs]
     largest = max((np.nanmax(force, initial=0.0) for of in forces for force in of.values()), default=0.0)
-    if largest <= 0.0 or max(len(results.history["time"]) for results in runs) < 3:
+    if largest <= 0.0:
         return None
-    for results in runs:
-        if OPTIONS.abscissa not in (None, *results.history):
-            raise ResultError(f"history.csv has no column {OPTIONS.abscissa}; it has {', '.join(results.history)}")
-    over = OPTIONS.abscissa or (
-        "displacement_max" if all(_grows(results.history["displacement_max"]) for results in runs) else "time")
+    label, unit, abscissas = _abscissas(runs)
+    forces = [{name: force for name, force in of.items() if np.nanmax(force) > ROUNDING * largest} for of in forces]
+    supports = list(dict.fromkeys(support for of in forces for support in of))
     # Runs have colours, and supports dashes; the supports of a single run have both.
-    curves = [(", ".join(filter(None, (name, support))), results.history[over], force, k)
-              for k, (results, name, of) in enumerate(zip(runs, names, forces))
-              for support, force in of.items() if np.nanmax(force) > ROUNDING * largest]
-    labels = [label for label, *_ in curves]
-    below = room_for_legend(labels)
+    curves = [(", ".join(filter(None, (name, support))), abscissa, force, k, supports.index(support))
+              for k, (name, abscissa, of) in enumerate(zip(names, abscissas, forces))
+              for support, force in of.items()]
+    below = room_for_legend([of[0] for of in curves])
     text = "forces on the supports" if len(runs) > 1 else headline(runs[0], "forces on the supports")
     figure, axes = plot(text, figure, below=below)
-    dashes, reached = cycle(DASHES), max(np.nanmax(np.abs(abscissa)) for _, abscissa, *_ in curves)
-    across, up = power_of(reached), power_of(largest)
-    for number, (label, abscissa, force, k) in enumerate(curves):
-        axes.plot(abscissa / 10.0**across, force / 10.0**up, linewidth=1.6, linestyle=next(dashes), label=label,
-                  color=f"C{(k if len(runs) > 1 else number) % 10}")
-    if min(np.nanmin(abscissa) for _, abscissa, *_ in curves) >= 0.0:
+    across, up = power_of(max(np.nanmax(np.abs(abscissa)) for abscissa in abscissas)), power_of(largest)
+    colour = colours(max(len(runs), len(supports)))
+    for name, abscissa, force, k, number in curves:
+        axes.plot(abscissa / 10.0**across, force / 10.0**up, linewidth=1.6, linestyle=DASHES[number % len(DASHES)], label=name,
+                  color=colour[k if len(runs) > 1 else number])
+    if min(map(np.nanmin, abscissas)) >= 0.0:
         axes.set_xlim(left=0.0)
-    if min(np.nanmin(force) for _, _, force, _ in curves) < -ROUNDING * largest:
+    if min(np.nanmin(force) for _, _, force, *_ in curves) < -ROUNDING * largest:
         axes.axhline(0.0, color=FAINT, linewidth=0.7)
     else:
         axes.set_ylim(bottom=0.0)
     axes.locator_params("x", nbins=5)
-    of = {"label": "time t", "unit": runs[0].units["time"]} if over == "time" else runs[0].summary["figures"].get(over, {})
-    axes.set_xlabel(f"{of.get('label', over)}{times_power(across, of.get('unit', ''))}")
+    axes.set_xlabel(label + times_power(across, unit))
     axes.set_ylabel(f"force{times_power(up, runs[0].units['line'])}")
     legend(axes, below)
     return figure
+
+
+def _abscissas(runs):
+    """The abscissa of the forces: its label, its unit, and its values in each run."""
+    for results in runs:
+        if OPTIONS.abscissa not in (None, *results.history):
+            raise ResultError(f"history.csv has no column {OPTIONS.abscissa}; it has {', '.join(results.history)}")
+    driven = [driven_boundary(results) for results in runs] if OPTIONS.abscissa is None else [None]
+    if None not in driven:
+        names = dict.fromkeys(name for name, _ in driven)
+        return f"displacement of {' and '.join(names)}", runs[0].units["length"], [moved for _, moved in driven]
+    over = OPTIONS.abscissa or (
+        "displacement_max" if all(_grows(results.history["displacement_max"]) for results in runs) else "time")
+    of = {"label": "time t", "unit": runs[0].units["time"]} if over == "time" else runs[0].summary["figures"].get(over, {})
+    return of.get("label", over), of.get("unit", ""), [results.history[over] for results in runs]
 
 
 def _forces(history):

@@ -7,11 +7,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import signorini_results
-from drawing import INK, em, legend, plot, room_for_legend, wrapped
+from drawing import INK, colours, em, legend, plot, room_for_legend, wrapped
 from reading import open_run
 from results import ResultError, write_table
 from signorini_files import whole
-from signorini_summaries import units_of
+from signorini_summaries import settings_of, units_of, varied
 
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length", **dict.fromkeys(signorini_results.STRAINS, "")}
 
@@ -24,7 +24,7 @@ def draw_curves(arguments):
     folder, units = runs[0].folder, units_of(runs[0].summary)
     for quantity in arguments.quantity or ["von_mises"]:
         curves, rows = [], []
-        for run, name in zip(runs, differences([run.folder.name for run in runs])):
+        for run, name in zip(runs, names_of(runs)):
             frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
             if missing := [f"{time:g}" for time in arguments.times or [] if not np.isclose(time, list(frames)).any()]:
                 print(f"{run.folder}: no frame at t = {', '.join(missing)}: the nearest are drawn", file=sys.stderr)
@@ -51,8 +51,8 @@ def _draw(curves, abscissa, quantity, units):
     """A plot of curves: their labels, places and values."""
     below = room_for_legend([label for label, *_ in curves])
     figure, axes = plot(below=below)
-    for label, places, values in curves:
-        axes.plot(places, values, label=label, linewidth=1.3)
+    for (label, places, values), colour in zip(curves, colours(len(curves))):
+        axes.plot(places, values, label=label, linewidth=1.3, color=colour)
     unit = units.get(UNITS.get(quantity, "stress"), "")
     words = quantity.replace("_", " ").replace("mises", "Mises stress")
     axes.set_ylabel(f"{words} ({unit})" if unit else words)
@@ -73,13 +73,25 @@ def _way(run, arguments):
     return f"{arguments.along}: {', '.join(ends[:3])}{' …' * (len(ends) > 3)}"
 
 
+def names_of(runs):
+    """Names of runs for a legend: the values in which they differ, if their folders are called after these, else the folders."""
+    settings, folders = settings_of([run.summary for run in runs]), [run.folder.name for run in runs]
+    keys = varied(settings)
+    if not keys or any("=" not in folder for folder in folders):
+        return differences(folders)
+    return [", ".join(f"{key.rpartition('.')[2]} = {of[key]}" for key in keys if key in of) or folder
+            for of, folder in zip(settings, folders)]
+
+
 def differences(names):
     """The parts, between double underscores, in which names of folders differ; whole names if they do not."""
     # Fonts have no signs for bytes that are not UTF-8.
     names = [os.fsencode(name).decode(errors="replace") for name in names]
     parts = [name.split("__") for name in names]
     common = set(parts[0]).intersection(*parts[1:]) if len(names) > 1 else ()
-    return ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
+    found = ["__".join(part for part in of if part not in common) or name for of, name in zip(parts, names)]
+    # Legends leave out labels that begin with an underscore.
+    return [f" {name}" if name.startswith("_") else name for name in found]
 
 
 def _values(frame, arguments, quantity):

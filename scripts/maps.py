@@ -55,8 +55,10 @@ def draw_state(results, limits, figure=None):
 
     # Pressing loads are outside the body.
     beyond = ARROW * results.size * (limits.load > 0.0) * np.array([[-1.0], [1.0]])
-    caption = headline(results, f"{results.part}, {_amplified(results, limits)}")
-    return draw_maps([Map(coloured.title, limits.box + beyond, paint)], caption, results.units, figure)
+    amplified = _amplified(results, limits)
+    caption = headline(results, f"{results.part}, {amplified}")
+    title = coloured.title if OPTIONS.titles else f"{coloured.title}; {amplified}"
+    return draw_maps([Map(title, limits.box + beyond, paint)], caption, results.units, figure)
 
 
 def deformed_map(results, limits):
@@ -75,8 +77,7 @@ def deformed_map(results, limits):
         draw_foundation(axes, results, limits.factor)
         _draw_fall(axes, results, moved)
 
-    title = _amplified(results, limits) if OPTIONS.titles else ""
-    return Map(title, limits.box, paint, has_bar=False)
+    return Map(_amplified(results, limits), limits.box, paint, has_bar=False)
 
 
 def von_mises_map(results, limits, factor=None):
@@ -86,6 +87,8 @@ def von_mises_map(results, limits, factor=None):
     if OPTIONS.titles:
         said = results.said("von_mises_max", largest, size)
         title += f", largest {said}" + ": singular (circle)" * bool(is_singular and largest > 0.0)
+    elif is_singular and largest > 0.0:
+        title += "; circle: singular"
     factor = results.factor if factor is None else factor
 
     def paint(axes):
@@ -140,10 +143,12 @@ def _draw_fall(axes, results, moved):
 
 
 def _amplified(results, limits):
-    """The amplification in words."""
+    """The amplification in words, with titles also the largest displacement."""
     if results.unloaded:
         return "unloaded"
     largest = results.said("displacement_max", np.linalg.norm(results.displacement, axis=1).max())
     what = "displacements and gaps" if len(results.contact) else "displacements"
     scale = "to scale" if limits.factor == 1.0 else f"× {limits.factor:g}"
+    if not OPTIONS.titles:
+        return f"{what} {scale}"
     return f"{what} {scale}, largest {largest} {results.units['length']}"

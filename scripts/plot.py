@@ -11,9 +11,13 @@ pressure       contact pressure and gap along Γ_C
 damage-history the largest and the mean damage 1 − ζ in time, if there is damage
 force-displacement  the forces on the supports over the largest displacement, or over time if this does not grow
 
---only pressure,setting draws only these. With --together: one force-displacement of all runs.
+--only pressure,setting draws only these. With --together: one force-displacement and one pressure of all runs.
 
 With --line or --along: curves of fields at several times, of one or more runs, with their numbers as CSV.
+
+With --figure: figures of a study over the value that it varies, with their bars, and with their numbers as CSV:
+
+    signorini plot out/lshape-study --figure zeta_min,foundation.force_y
 
 On request: mesh; contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
 pressure as animations.
@@ -28,19 +32,22 @@ from math import inf, isfinite
 
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
-from animation import FRAMES, MOVIES, animate
-from contact_pressure import draw_evolution, draw_pressure
+from animation import animate
+from contact_pressure import draw_evolution, draw_pressure, draw_pressures
 from histories import draw_damage_history, draw_force_displacement, draw_forces
 from limits import box_of, limits_of
-from lines import differences, draw_curves
+from lines import draw_curves, names_of as names_of_runs
 from maps import draw_deformed, draw_mesh, draw_stress_and_damage
 from paraview_script import write_script
 from principal import draw_principal
-from reading import evenly, read_results, states
-from results import telling
+from reading import evenly, read_results, read_without_fields, states
+from results import ResultError, telling
 from setting import draw_setting
 from signorini_files import check, whole
-from signorini_summaries import folders_of
+from signorini_movies import FRAMES, MOVIES, check_movie
+from signorini_summaries import folders_of, is_study, summary_or_error
+from study_pictures import drawn
+from table import names_of
 
 PICTURES = {
     "setting": draw_setting,
@@ -51,6 +58,8 @@ PICTURES = {
     "damage-history": draw_damage_history,
     "force-displacement": draw_force_displacement,
 }
+# Pictures of several runs together.
+TOGETHER = {"pressure": draw_pressures, "force-displacement": draw_forces}
 # Pictures of the whole run, for all times.
 OF_ALL_TIMES = ("damage-history", "force-displacement")
 # The file formats of pictures.
@@ -84,7 +93,12 @@ def arguments_of(prog):
     parser.add_argument("--only", type=lambda text: text.split(","), default=list(PICTURES), metavar="NAME,…", help=(
         "only these pictures, by the names above"))
     parser.add_argument("--together", action="store_true", help=(
-        "only force-displacement-together, the forces of all runs in one picture, into the first folder"))
+        "only force-displacement-together and pressure-together, the forces of all runs and their contact pressures in one picture "
+        "each, into the first folder"))
+    parser.add_argument("--figure", type=names_of, metavar="NAME,…", help=(
+        "only these figures of a study, or of several runs, over the values that they vary, with the numbers as CSV"))
+    parser.add_argument("--over", metavar="KEY", help=(
+        "the varied key below the curves of --figure, or run (default: the first; the others have a curve for each value)"))
     parser.add_argument("--abscissa", metavar="COLUMN", help=(
         "column of history.csv over which force-displacement draws the forces: time, displacement_max, work, …"))
     parser.add_argument("--range", type=numbers(2), metavar="A,B", help="stresses at the ends of the colour bars, Pa; compression is positive")
@@ -174,12 +188,40 @@ def draw(results, limits, arguments):
             tell(path)
 
 
+def draw_together(runs, arguments):
+    """Draws the pictures of all runs together into the folder of the first one."""
+    chosen = [name for name in TOGETHER if name in arguments.only]
+    if not chosen:
+        raise ResultError(f"--together draws {' and '.join(TOGETHER)}; name one of them after --only")
+    if len({tuple(run.units.items()) for run in runs}) > 1:
+        raise ResultError("the runs have different units; draw those with the same units together")
+    names, found = names_of_runs(runs), []
+    for name in chosen:
+        figure = TOGETHER[name](runs, names)
+        found += [name] * (figure is not None)
+        save(figure, runs[0], f"{name}-together", arguments.format)
+    if not found:
+        raise ResultError("nothing to draw together: forces need runs with time steps, and pressures runs with a foundation")
+
+
 def main(prog=None):
     """Returns the exit code: 2 if a picture could not be drawn. A message names it."""
     arguments = arguments_of(prog)
     drawing.use(width=arguments.width, titles=not arguments.no_title, contours=arguments.contours,
                 abscissa=arguments.abscissa, range=arguments.range)
+    if arguments.animate:
+        try:
+            check_movie(arguments.animate)
+        except ValueError as error:
+            print(f"error: --animate: {error}", file=sys.stderr)
+            return 2
+    target = arguments.folders[0]
     arguments.folders = folders_of(arguments.folders)
+    if arguments.figure:
+        summaries = list(map(summary_or_error, arguments.folders))
+        target = target if is_study(target) else arguments.folders[0]
+        return 0 if drawn(arguments.folders, summaries, arguments.figure, target, over=arguments.over,
+                          formats=arguments.format) else 2
     if arguments.line or arguments.along:
         with telling(arguments.folders[0]) as problems:
             for path in draw_curves(arguments):
@@ -188,7 +230,8 @@ def main(prog=None):
     runs, failed = [], False
     for folder in arguments.folders:
         with telling(folder) as problems:
-            runs.append(read_results(folder, arguments.time, arguments.material))
+            runs.append(read_without_fields(folder, arguments.time) if arguments.together else
+                        read_results(folder, arguments.time, arguments.material))
             last = runs[-1].frames[-1][0]
             if arguments.time is not None and arguments.time > last:
                 print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",
@@ -196,8 +239,7 @@ def main(prog=None):
         failed |= bool(problems)
     if arguments.together and runs:
         with telling() as problems:
-            names = differences([run.folder.name for run in runs])
-            save(draw_forces(runs, names), runs[0], "force-displacement-together", arguments.format)
+            draw_together(runs, arguments)
         return 2 if failed or problems else 0
     for results in runs:
         with telling(results.folder) as problems:

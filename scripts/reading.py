@@ -29,14 +29,14 @@ def whole(path):
         raise ResultError(f"{path}: it is damaged or cut off; run the scene again") from None
 
 
-def open_run(folder):
-    """A run of `signorini_results` with at least one frame; a problem is an error in one line."""
+def open_run(folder, files=(("history.csv", "columns"), ("fields.pvd", "frames"))):
+    """A run of `signorini_results` that has something in these files; a problem is an error in one line."""
     folder, summary = Path(folder), {}
     try:
         run = signorini_results.load(folder)
         summary = run.summary
         # Properties read their files at first use.
-        for name, read in (("history.csv", "columns"), ("fields.pvd", "frames")):
+        for name, read in files:
             with whole(folder / name) as path:
                 if not getattr(run, read):
                     raise ResultError(f"{path}: it is empty")
@@ -55,9 +55,7 @@ def read_results(folder, time=None, material=None):
     """The contents of a folder of results, with the frame nearest to `time` or the last frame; of one material only, if
     it is named."""
     run = open_run(folder)
-    with whole(run.folder / "scene.toml") as file:
-        scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-        scene = with_values(scene, run.folder)
+    scene = _scene_of(run.folder)
     chosen = run.frames[-1 if time is None else nearest(run.frames, time)]
     fields = read_frame(chosen[1])
     try:
@@ -70,6 +68,25 @@ def read_results(folder, time=None, material=None):
         raise ResultError(f"{folder}: the field {error} is missing") from None
     except ValueError as error:
         raise ResultError(f"{folder}: {error}") from None
+
+
+def read_without_fields(folder, time=None):
+    """The history of a run, and the state of its contact boundaries nearest to `time` or the last one. A run of a study, which
+    writes no frames, has them as well."""
+    run = open_run(folder, [("history.csv", "columns")])
+    times = sorted(_contact_rows(run.folder / "contact.csv")) or list(run.columns["time"][-1:])
+    frames = [(of, None) for of in times]
+    chosen = times[-1 if time is None else nearest(frames, time)]
+    nodes = np.vstack([np.reshape(edges, (-1, 2)) for edges in run.summary["boundaries"].values()])
+    return Results(run.folder, run.summary, _scene_of(run.folder), run.columns, frames, chosen, nodes, None,
+                   curves=_contact_curves(run.folder, chosen))
+
+
+def _scene_of(folder):
+    """The scene as run, with the values of its constants; empty if the folder lacks it."""
+    with whole(folder / "scene.toml") as file:
+        scene = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        return with_values(scene, folder)
 
 
 def nearest(frames, time):

@@ -1,6 +1,7 @@
 """Writes files by the rule of `signorini run`: what it did not write is not replaced, and what it writes appears whole."""
 
 import os
+import re
 import secrets
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +30,14 @@ def begins(path, start):
             return file.read(len(start)) == start
     except OSError:
         return False
+
+
+def is_of_study(path):
+    """Whether a file is in the folder of a study: there is an empty file `.locks`, and study.csv has the head of its table. The
+    names of tables and pictures there belong to the program."""
+    locks, table = Path(path).with_name(".locks"), Path(path).with_name("study.csv")
+    return (locks.is_file() and not locks.is_symlink() and not locks.stat().st_size and (
+        Path(path) == locks or table.is_file() and bool(re.match(rb"run,.*\bstatus\b", table.read_bytes()))))
 
 
 def check(path, is_own=is_of_run):

@@ -6,12 +6,14 @@ tables, scipy for matrices.
     result                                       # its figures; in a notebook with a picture
     result.figures["work"]["value"], result.times, result.history["contact_force"]
     result.plot("damage", time=0.5), result.plot.pressure()
+    result.animate("damage", "damage.gif")       # or .mp4, by ffmpeg
     result.matrices().K                          # and M, L, f, A, a, B, g, u, zeta, …: see `signorini export`
     frame = result.frame(0.5)                    # the frame nearest to t = 0.5; without a time the last one
     frame.field("zeta"), frame.field("stress_yy"), frame.at((3, 5), "strain_xx"), frame.gradient((3, 5), "zeta")
     along, zeta = frame.line((0, 5), (8, 5), "zeta")
     along, pressure = frame.along("foundation", "normal_pressure")
     table(["out/lshape", "out/beam"], ["work", "clamp.force_y"])
+    table("out/lshape-study", ["work"]).plot(x="material.young", y="work", yerr="work.bar", marker="o")   # with --bars
 """
 
 import base64
@@ -35,7 +37,7 @@ import meshio
 import numpy as np
 
 from signorini_files import whole
-from signorini_summaries import read_summary, rows_of, summary_of, unknown
+from signorini_summaries import columns_of, folders_of, read_summary, rows_of, summary_of, unknown
 
 # Names of components: the array of a frame, and the column in it.
 COMPONENTS = {
@@ -69,7 +71,12 @@ def run(scene, *options, out=None, **overrides):
     sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
     with _written(scene) as (path, name):
         out = Path(out or Path("out") / name)
-        _call("run", str(path), "--out", str(out), *sets, *map(str, options))
+        try:
+            _call("run", str(path), "--out", str(out), *sets, *map(str, options))
+        except RuntimeError as error:
+            if not isinstance(scene, dict):
+                raise
+            raise RuntimeError(str(error).replace(str(path), "the scene")) from None
     return load(out)
 
 
@@ -144,16 +151,15 @@ def _keys(overrides, prefix=""):
 
 
 def table(folders, columns=None):
-    """A pandas frame with a row per folder (or its Run): the settings in which the runs differ, and columns of summary.json with
+    """A pandas frame with a row per folder (or its Run), or per run of a folder of a study: the settings in which the runs differ, and columns of summary.json with
     their bars, as `signorini table` prints them. Its `attrs["units"]` are the units by column."""
     try:
         import pandas
     except ImportError:
         raise ImportError("table() needs pandas (Debian: apt install python3-pandas); `signorini table` prints the same") from None
 
-    from signorini_summaries import columns_of, rows_of, summary_of, unknown
-
-    folders = [getattr(folder, "folder", folder) for folder in folders]
+    folders = [folders] if isinstance(folders, (str, Path)) else folders
+    folders = folders_of([getattr(folder, "folder", folder) for folder in folders])
     summaries = [summary_of(folder) for folder in folders]
     if problems := list(unknown(columns or [], summaries)):
         raise ValueError("; ".join(problems))
@@ -184,6 +190,34 @@ class Run:
     def plot(self):
         """Pictures: `plot("damage", time=0.5)`, `plot.pressure()`."""
         return Plot(self)
+
+    def animate(self, name, path, factor=0.0, rate=6, **style):
+        """Writes an animation of a field, see `plot`, over at most 50 frames with the same colours: `rate` of them per second. The
+        ending of `path` says how: gif, or mp4 by ffmpeg. Another file is not replaced. Returns the path."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        from signorini_movies import FRAMES, check_movie, is_movie, movie
+
+        path = Path(path)
+        check_movie(path.suffix[1:])
+        times = [self.times[k] for k in np.unique(np.linspace(0, len(self.times) - 1, FRAMES).round().astype(int))]
+        frames = [self.frame(time) for time in times]
+        values = [_values(frame, name) for frame in frames]
+        tops = [_top(frame, of) for frame, of in zip(frames, values)]
+        corners = np.array([_ends(frame.points + factor * frame.field("displacement")[:, :2]) for frame in frames])
+        low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+        air = 0.03 * (high - low).max()
+        style = {"vmin": 0.0 if name == "damage" else min(map(np.min, values)), "vmax": max(tops), **style}
+        figure = Figure(figsize=(6, 4), layout="compressed")
+        FigureCanvasAgg(figure)
+        with movie(figure, path, is_movie, rate) as grab:
+            for frame in frames:
+                figure.clear()
+                axes = self.plot(name, frame.time, figure.subplots(), factor, **style)
+                axes.set(xlim=(low[0] - air, high[0] + air), ylim=(low[1] - air, high[1] + air))
+                grab()
+        return path
 
     @property
     def ended(self):
@@ -304,19 +338,13 @@ class Plot:
         import matplotlib.pyplot as pyplot
 
         frame, axes = self.run.frame(time), axes or pyplot.figure(layout="compressed").subplots()
-        values = 1.0 - frame.field("zeta") if name == "damage" else frame.field(name)
+        values = _values(frame, name)
         unit = "length" if name in ("u_x", "u_y", "gap") else "" if name in ("damage", "zeta") else "stress"
         corners, points = frame.elements[:, :3], frame.points + factor * frame.field("displacement")[:, :2]
-        # A peak on a small area must not darken the rest: the colours end where 0.5 % of the area has more.
-        a, b, c = (frame.points[corners[:, k]] for k in range(3))
-        means, areas = values[corners].mean(axis=1), _cross(b - a, c - a)
-        order = means.argsort()
-        top = means[order[np.searchsorted(areas[order].cumsum(), 0.995 * areas.sum())]]
-        peaks = {"vmax": top} if values.max() > 4.0 * top > 0.0 else {}
-        style = {"shading": "gouraud", "cmap": "magma" if name == "damage" else "viridis", **peaks, **style}
+        style = {"shading": "gouraud", "cmap": "magma" if name == "damage" else "viridis", "vmax": _top(frame, values), **style}
         label = "damage 1 − ζ" if name == "damage" else f"{name} ({self.units[unit]})" if unit else name
         axes.figure.colorbar(axes.tripcolor(*points.T, corners, values, **style), ax=axes, label=label,
-                             extend="max" if peaks else "neither")
+                             extend="max" if values.max() > style["vmax"] else "neither")
         axes.set(aspect="equal", xlabel=f"x ({self.units['length']})", ylabel=f"y ({self.units['length']})",
                  title=f"t = {frame.time:g} {self.units['time']}")
         return _plain(axes)
@@ -335,6 +363,27 @@ class Plot:
                  title=f"t = {frame.time:g} {self.units['time']}")
         axes.legend()
         return _plain(axes)
+
+
+def _values(frame, name):
+    """The damage, that is 1 − ζ, or a field of a frame."""
+    return 1.0 - frame.field("zeta") if name == "damage" else frame.field(name)
+
+
+def _top(frame, values):
+    """The top of the colours: the largest value. A peak on a small area must not darken the rest: then the value that 0.5 % of the
+    area exceeds."""
+    corners = frame.elements[:, :3]
+    a, b, c = (frame.points[corners[:, k]] for k in range(3))
+    means, areas = values[corners].mean(axis=1), _cross(b - a, c - a)
+    order = means.argsort()
+    top = means[order[np.searchsorted(areas[order].cumsum(), 0.995 * areas.sum())]]
+    return top if values.max() > 4.0 * top > 0.0 else values.max()
+
+
+def _ends(points):
+    """The lower left and the upper right corner of a box around points."""
+    return points.min(axis=0), points.max(axis=0)
 
 
 def _plain(axes):

@@ -1,11 +1,14 @@
 """Reads summary.json of runs: figures with their error bars and units, as rows of a table."""
 
+import csv
 import difflib
 import json
 import re
 import sys
 from math import inf
 from pathlib import Path
+
+from signorini_files import is_of_study
 
 # The ends of columns with the reason why the mesh does not determine an extreme.
 FLAGS = (".singular", ".unresolved")
@@ -71,9 +74,30 @@ def summary_of(folder):
         raise ValueError(f"{path}: {error.strerror}; name folders of results") from None
 
 
+def summary_or_error(folder):
+    """summary.json of a folder, or a summary with nothing but the reason why there is none."""
+    try:
+        return summary_of(folder)
+    except ValueError as error:
+        return {"error": str(error)}
+
+
 def folders_of(names):
-    """`names` without files: the table of a study stands beside its folders."""
-    return [name for name in names if not Path(name).is_file()] or names
+    """`names` without files, as the table of a study stands beside its folders; in place of a study the runs of its table."""
+    folders = [name for name in names if not Path(name).is_file()] or names
+    return [run for folder in folders for run in (runs_of(folder) if is_study(folder) else [folder])]
+
+
+def is_study(folder):
+    """Whether a folder is that of a study."""
+    return is_of_study(Path(folder) / "study.csv")
+
+
+def runs_of(study):
+    """The folders of the runs of a study, in the order of its table."""
+    # Names of folders may be any bytes.
+    with open(Path(study) / "study.csv", newline="", encoding="utf-8", errors="surrogateescape") as file:
+        return [str(Path(study) / row["run"]) for row in csv.DictReader(file)]
 
 
 def option_of(summary, name):
@@ -152,6 +176,18 @@ def unit_of(name, summary):
     return units.get(kind, kind)
 
 
+def settings_of(summaries):
+    """The keys that the command of each run sets, with their values."""
+    return [dict(map(str.strip, text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
+            for summary in summaries]
+
+
+def varied(settings):
+    """The keys in which runs differ, in the order of appearance."""
+    names = dict.fromkeys(name for of in settings for name in of)
+    return [name for name in names if len({of.get(name) for of in settings}) > 1]
+
+
 def rows_of(folders, summaries, columns, settings=None):
     """A row for each folder, and the units of columns.
 
@@ -159,11 +195,8 @@ def rows_of(folders, summaries, columns, settings=None):
     NAME.bar and the reasons NAME.singular and NAME.unresolved, if a run has them. `reached` tells whether the run has the accuracy asked
     for, `status` whether it finished, stopped early or failed.
     """
-    settings = settings or [dict(map(str.strip, text.split("=", 1)) for text in option_of(summary, "set") if "=" in text)
-                            for summary in summaries]
-    names = list(dict.fromkeys(name for of in settings for name in of))
-    names = [n for n in names if len({of.get(n) for of in settings}) > 1]
-    rows, units = [], {}
+    settings = settings or settings_of(summaries)
+    names, rows, units = varied(settings), [], {}
     for folder, summary, of in zip(folders, summaries, settings):
         row = {"run": Path(folder).name, **{name: of.get(name) for name in names}}
         for name in columns:

@@ -3,7 +3,7 @@
 table.
 
     signorini study geo/lshape.toml --set material.young=1e5,2e5,4e5 --set mesh.size=0.5,0.25
-    signorini study geo/lshape.toml --cases cases.csv
+    signorini study geo/lshape.toml --cases cases.csv --plot zeta_min,foundation.force_y
 
 Each row of cases.csv is a run; the columns are keys or names of constants, and an empty cell leaves a key as it is.
 Each run has a folder below OUT, named by its values, or by the column `label`; OUT/study.csv is the table. A study
@@ -27,11 +27,11 @@ import time
 import zlib
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import chdir, contextmanager, suppress
 from pathlib import Path
 
 from server import Server
-from signorini_files import check, check_folder, whole
+from signorini_files import check, check_folder, is_of_study, whole
 from signorini_summaries import columns_of, rows_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
 
@@ -165,19 +165,12 @@ def outcome(folder, error):
     return summary if not error or "error" in summary else {"error": " ".join(lines) or error}
 
 
-def is_of_study(path):
-    """Whether a file stands in the folder of a study: there is an empty file `.locks`, and the head is that of its table."""
-    locks = path.with_name(".locks")
-    return (locks.is_file() and not locks.is_symlink() and not locks.stat().st_size
-            and (path == locks or re.match(rb"run,.*\bstatus\b", path.read_bytes())))
-
-
-def own(out):
-    """Makes the folder of a study; returns its file `.locks`, open."""
+def own(out, pictures):
+    """Makes the folder of a study with these `pictures`; returns its file `.locks`, open."""
     check_folder(out)
     out.mkdir(parents=True, exist_ok=True)
-    for name in (".locks", "study.csv"):
-        check(out / name, is_of_study)
+    for path in (out / ".locks", out / "study.csv", *pictures):
+        check(path, is_of_study)
     return open(out / ".locks", "ab")
 
 
@@ -236,8 +229,8 @@ def warn_of_columns(columns, folder):
         print(f"warning: {problem.replace('no summary has', f'{folder.name} has no', 1)}", file=sys.stderr, flush=True)
 
 
-def run_all(out, everything, inputs, jobs, columns):
-    """Runs commands in their folders, except those that are complete; returns the errors by folder."""
+def run_all(out, everything, inputs, jobs, columns, pictures):
+    """Runs commands in their folders, except those that are complete; returns the errors by folder. The study draws `pictures`."""
     open_runs = [of for of in everything if not is_complete(*of, inputs)]
     done, failed, jobs = len(everything) - len(open_runs), {}, max(1, min(jobs, len(open_runs)))
     first = next((folder for folder, command in everything if (folder, command) not in open_runs), None)
@@ -250,7 +243,7 @@ def run_all(out, everything, inputs, jobs, columns):
         with claim(locks, of[0]) as is_free:
             return None if not is_free else "" if is_complete(*of, inputs) else run(of[1], idle, running)
 
-    with own(out) as locks:
+    with own(out, pictures) as locks:
         while open_runs:
             later = {}
             with servers(jobs) as idle, ThreadPoolExecutor(jobs) as pool, stopping(pool, running):
@@ -286,6 +279,8 @@ def main(prog=None):
     parser.add_argument("--frames", action="store_true", help="with frames, as `run` writes them")
     parser.add_argument("--columns", type=names_of, action="extend", metavar=(
         "NAME,…"), help="of the table, as for `signorini table`")
+    parser.add_argument("--plot", type=names_of, action="extend", default=[], metavar="NAME,…", help=(
+        "figures to draw over the first varied value, with a curve for each of the others; numbers beside it as CSV"))
     words = sys.argv[1:]
     cut = words.index("--") if "--" in words else len(words)
     (arguments, others), more = parser.parse_known_args(words[:cut]), words[cut + 1:]
@@ -307,8 +302,14 @@ def main(prog=None):
     named = [(label, product if label else case + product) for label, case in cases for product in products]
     folders = [out / name for name in names_for(named)]
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
+    pictures = []
+    if arguments.plot:
+        # matplotlib would follow a file matplotlibrc in the current folder, which can name programs.
+        with chdir("/"):
+            from study_pictures import drawn, paths_of
+        pictures = [path for paths in paths_of(out, arguments.plot, ["png"]).values() for path in paths]
     failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs,
-                     arguments.columns or [])
+                     [*(arguments.columns or []), *arguments.plot], pictures)
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
     rows, units = rows_of(folders, summaries, arguments.columns or columns_of(summaries), list(map(dict, chosen)))
     printed(rows, units)
@@ -316,6 +317,8 @@ def main(prog=None):
         write_table(rows, part, units)
     print(out / "study.csv")
     is_refused = refused(arguments.columns, list(filter(None, summaries)))
+    if arguments.plot:
+        is_refused |= not drawn(folders, summaries, arguments.plot, out, settings=list(map(dict, chosen)))
     return 1 if failed else 2 if is_refused else 0
 
 

@@ -3,12 +3,14 @@
 summary.json with their units and error bars.
 
     signorini table out/*/ --columns end_time,stopped_at,clamp.force_y,displacement_max.governing
+    signorini table out/lshape-study --latex
 """
 
 import argparse
 import csv
 import sys
 
+import latex
 from bars import barred, plain
 from signorini_summaries import FLAGS, columns_of, flag_of, folders_of, named, rows_of, summary_of, unknown
 
@@ -47,9 +49,10 @@ def write_table(rows, path, units=None):
         write_rows(rows, file, units)
 
 
-def printed(rows, units, as_csv=False):
-    """Prints rows as CSV with all digits, or aligned: figures with their bars, without columns that have no value."""
-    if as_csv:
+def printed(rows, units, form=None):
+    """Prints rows as `csv` with all digits, as `latex`, or aligned: the last two have figures with their bars, without columns
+    that have no value."""
+    if form == "csv":
         write_rows(rows, sys.stdout, units)
         return
 
@@ -61,7 +64,12 @@ def printed(rows, units, as_csv=False):
 
     names = list(dict.fromkeys(name for row in rows for name in row if not name.endswith((".bar", *FLAGS))))
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]
-    lines = [titles(names, units)] + [[cell(row, name) for name in names] for row in rows]
+    cells = [[cell(row, name) for name in names] for row in rows]
+    if form == "latex":
+        print(latex.tabular([latex.titled(name, units.get(name, "")) for name in names],
+                            [[latex.number(text) for text in line] for line in cells]))
+        return
+    lines = [titles(names, units), *cells]
     widths = [max(map(len, column)) for column in zip(*lines)]
     for line in lines:
         print("  ".join(text.ljust(width) for text, width in zip(line, widths)).rstrip())
@@ -78,11 +86,15 @@ def main(prog=None):
     """Returns the exit code: 2 if a folder has no results or a column is unknown; the other rows are printed."""
     parser = argparse.ArgumentParser(
         prog=prog, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", nargs="+", metavar="OUT", help="folders of results")
+    parser.add_argument("folders", nargs="+", metavar="OUT", help="folders of results, or of a study")
     parser.add_argument("--columns", type=names_of, action="extend", metavar="NAME,…", help=(
         "figures, also NAME.governing and NAME.governing.time of the whole run, and entries of summary.json: errors.solver; "
         "a name with a comma stands in double quotes"))
-    parser.add_argument("--csv", action="store_true", help="as CSV with all digits; error bars are columns NAME.bar")
+    forms = parser.add_mutually_exclusive_group()
+    forms.add_argument("--csv", action="store_const", const="csv", dest="form", help=(
+        "as CSV with all digits; error bars are columns NAME.bar"))
+    forms.add_argument("--latex", action="store_const", const="latex", dest="form", help=(
+        "as a table for LaTeX with booktabs and siunitx"))
     arguments = parser.parse_args()
     found, failed = {}, False
     for folder in folders_of(arguments.folders):
@@ -93,7 +105,7 @@ def main(prog=None):
             failed = True
     if found:
         columns = arguments.columns or columns_of(found.values())
-        printed(*rows_of(found, found.values(), columns), arguments.csv)
+        printed(*rows_of(found, found.values(), columns), arguments.form)
         failed |= refused(arguments.columns, found.values())
     return 2 if failed else 0
 

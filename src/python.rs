@@ -16,12 +16,12 @@ macro_rules! scripts {
 }
 
 /// The scripts and the modules that they import from each other.
-pub(crate) const SCRIPTS: [(&str, &str); 37] = scripts! {
-    "animation" "bars" "compare" "contact_pressure" "drawing" "elements" "expressions"
-    "histories" "info" "limits" "lines" "maps" "meshes/abaqus" "meshes/abaqus_keywords" "meshes/by_meshio" "meshes/convert"
+pub(crate) const SCRIPTS: [(&str, &str); 41] = scripts! {
+    "animation" "bars" "compare" "contact_pressure" "drawing" "driven" "elements" "expressions"
+    "histories" "info" "latex" "limits" "lines" "maps" "meshes/abaqus" "meshes/abaqus_keywords" "meshes/by_meshio" "meshes/convert"
     "meshes/description" "meshes/msh" "meshes/nastran" "meshes/universal" "paraview_script" "paraview_view" "plot" "principal"
-    "reading" "report" "report_pdf" "results" "server" "setting" "signorini_files" "signorini_results" "signorini_summaries"
-    "study" "table" "view" "viewer"
+    "reading" "report" "report_pdf" "results" "server" "setting" "signorini_files" "signorini_movies" "signorini_results"
+    "signorini_summaries" "study" "study_pictures" "table" "view" "viewer"
 };
 /// Names and texts of files in scripts/page/.
 macro_rules! page {

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from shared import ROOT, out_of, parser_of
-from drawing import FAINT, INK, MaxNLocator, plt
+from drawing import FAINT, INK, MaxNLocator, drawn_ticks, plt
 from reading import read_frame
 from references import geometry_of, kept, nested
 from results import markdown, read_table, write_table
@@ -250,9 +250,7 @@ def finish(axes):
         powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)))
         tried = [np.outer(powers, of).ravel() for of in ([1], [1, 2, 5], range(1, 10))]
         tried = [ticks[(low <= ticks) & (ticks <= high)] for ticks in [*tried, MaxNLocator(5).tick_values(low, high)]]
-        ticks = next((ticks for ticks in tried if len(ticks) > 2), tried[-1])
-        axis.set_ticks([], minor=True)
-        axis.set_ticks(ticks, [f"{tick:g}" for tick in ticks])
+        drawn_ticks(axis, next((ticks for ticks in tried if len(ticks) > 2), tried[-1]))
     axes.grid(color=FAINT, alpha=0.3, linewidth=0.5)
     axes.set_axisbelow(True)
 

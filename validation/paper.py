@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""The paper's Figures 1 to 9 and its Table 1 in its layout, into out/paper: displacements × 10, ζ rather than 1 − ζ,
-and a sheet of all of them for a reader who has the paper beside it.
+"""The paper's Figures 1 to 9 and its Table 1 in its layout, into out/paper: displacements × 10, ζ rather than 1 − ζ, as wide as
+columns or pages of a journal; and a sheet of all of them, as wide as its page, for a reader who has the paper beside it.
 
     paper.py [--binary FILE] [--quick]
 
@@ -14,13 +14,17 @@ import numpy as np
 
 from shared import ROOT, parser_of
 import converge
-from drawing import BLUE, INK, RED, plt
+import drawing
+import latex
+from drawing import BLUE, INK, RED, Map, draw_body, draw_colourbar, draw_maps, draw_values, mesh_of, plt, wrapped
 from limits import limits_of
-from maps import draw_deformed, draw_mesh, draw_stress_and_damage
+from maps import draw_deformed, draw_mesh, von_mises_map
 from reading import read_results
 from results import write_table
 from setting import draw_setting
 
+# The widths of a column and of the page of a journal, and dots per inch.
+COLUMN, PAGE, DPI = 3.5, 7.2, 300
 # Scene, overrides, and the figures of its run: number → drawing.
 RUNS = {
     "square": (["mesh.size=0.125", "time.end=0.01", "time.step=0.01"], {2: "setting"}),
@@ -33,10 +37,10 @@ CAPTIONS = {
     3: "Example I: the error against h + k, in the norm of Corollary 7.",
     4: "Example II: contact problem of an L-shaped domain.",
     5: "Example II: deformed mesh (× 10) and initial configuration.",
-    6: "Example II: von Mises stress and damage at the final time.",
+    6: "Example II: von Mises stress and damage field ζ (1: sound) at the final time.",
     7: "Example III: a U-shaped domain.",
     8: "Example III: deformed mesh (× 10) and initial configuration.",
-    9: "Example III: von Mises stress and damage at the final time.",
+    9: "Example III: von Mises stress and damage field ζ (1: sound) at the final time.",
 }
 OURS = """\
 What the paper does not print, and what we took (geo/*.toml):
@@ -57,9 +61,22 @@ def solved(binary, name, sets, folder):
     return read_results(folder)
 
 
+def draw_stress_and_zeta(results, limits):
+    """Figures 6 and 9: the von Mises stress, and the damage field ζ, dark where the body is damaged."""
+    def paint(axes):
+        mesh, zeta = mesh_of(results, results.nodes), results.pieces.at_points(results.zeta)
+        bar = draw_colourbar(axes, draw_values(axes, mesh, zeta, "magma", zeta.min(), 1.0))
+        # ζ is close to 1, which takes many digits.
+        bar.ax.yaxis.set_major_formatter(lambda tick, _: f"{tick:g}")
+        bar.ax.tick_params(labelsize="small")
+        draw_body(axes, results, 0.0)
+
+    return draw_maps([von_mises_map(results, limits), Map("damage field ζ", results.box, paint)], "", results.units)
+
+
 def draw_sketch():
     """Figure 1: the body Ω, the parts Γ_D, Γ_N, Γ_C of its boundary, and the gap g to the obstacle."""
-    figure, axes = plt.subplots(figsize=(5.0, 3.6), layout="constrained")
+    figure, axes = plt.subplots(figsize=(COLUMN, 0.72 * COLUMN), layout="constrained")
     angle = np.linspace(0.0, 2 * np.pi, 400)
     radius = 1.0 + 0.08 * np.cos(3 * angle) + 0.05 * np.sin(2 * angle)
     x, y = 1.5 * radius * np.cos(angle), radius * np.sin(angle)
@@ -70,22 +87,22 @@ def draw_sketch():
             (4.2, 5.3, INK, r"$\Gamma_C$", (0.0, -0.72)), (0.2, 1.6, RED, r"$\Gamma_N$", (0.85, 0.45))):
         part = (angle >= low) & (angle <= high)
         axes.plot(x[part], y[part], color=colour, linewidth=2.6)
-        axes.text(*place, name, color=colour, fontsize=13)
+        axes.text(*place, name, color=colour, fontsize=10, parse_math=True)
     axes.axhline(-1.3, color=INK, linewidth=2.0)
     axes.fill_between([-2.2, 2.2], -1.3, -1.45, hatch="////", facecolor="none", edgecolor=INK, linewidth=0)
     k, j = (np.abs(angle - place).argmin() for place in (4.45, 4.95))
     gap, arrow = ({"arrowstyle": style, "color": INK, "shrinkA": 0, "shrinkB": 0} for style in ("<->", "->"))
     axes.annotate("", (x[k], -1.3), (x[k], y[k]), arrowprops=gap)
-    axes.text(x[k] + 0.07, -1.2, "g", fontsize=12)
+    axes.text(x[k] + 0.07, -1.2, "g", fontsize=9)
     normal = np.array([y[j + 1] - y[j - 1], x[j - 1] - x[j + 1]])
     axes.annotate("", (x[j], y[j]) + 0.3 * normal / np.hypot(*normal), (x[j], y[j]), arrowprops=arrow)
-    axes.text(x[j] + 0.12, y[j] - 0.25, r"$\nu$", fontsize=12)
+    axes.text(x[j] + 0.12, y[j] - 0.25, r"$\nu$", fontsize=9, parse_math=True)
     for top in (0.55, 0.95, 1.3):
         k = np.abs(angle - top).argmin()
         axes.annotate("", (x[k], y[k]), (1.25 * x[k], 1.3 * y[k]), arrowprops={"arrowstyle": "->", "color": RED})
-    axes.text(1.1, 1.0, r"$\mathbf{f}_N$", color=RED, fontsize=13)
-    axes.text(-0.1, 0.0, r"$\Omega$", fontsize=15)
-    axes.text(1.25, -1.68, "obstacle", fontsize=10)
+    axes.text(1.1, 1.0, r"$\mathbf{f}_N$", color=RED, fontsize=10, parse_math=True)
+    axes.text(-0.1, 0.0, r"$\Omega$", fontsize=11, parse_math=True)
+    axes.text(1.25, -1.68, "obstacle", fontsize=8)
     axes.set(xlim=(-2.3, 2.3), ylim=(-1.75, 1.6), aspect="equal")
     axes.axis("off")
     return figure
@@ -95,7 +112,7 @@ def written(figure, out, name):
     """Saves a figure as PNG and PDF; returns the path of the PNG."""
     for ending in ("pdf", "png"):
         path = out / f"{name}.{ending}"
-        figure.savefig(path)
+        figure.savefig(path, dpi=DPI)
     plt.close(figure)
     print(path)
     return path
@@ -108,7 +125,9 @@ def figures(binary, out):
         results = solved(binary, name, sets, out / "runs" / name)
         limits = limits_of([results], 10.0)
         for number, kind in drawn.items():
-            draw = {"setting": draw_setting, "deformed": draw_deformed, "stress": draw_stress_and_damage}
+            # Two maps stand beside each other on the page.
+            drawing.use(**{"width": PAGE, "height": 3.0} if kind == "stress" else {"width": COLUMN, "height": 7.0})
+            draw = {"setting": draw_setting, "deformed": draw_deformed, "stress": draw_stress_and_zeta}
             found[number] = [written(draw[kind](results, limits), out, f"figure-{number}")]
         if name == "square":
             found[2].append(written(draw_mesh(results), out, "figure-2-mesh"))
@@ -116,31 +135,50 @@ def figures(binary, out):
 
 
 def table_1(rows, out):
-    """Table 1 as CSV: ours and the printed value for each h and k."""
+    """Table 1 as CSV, and for LaTeX as the paper has it, with the printed value in brackets behind each of ours."""
     rows = [{key: row[key] for key in ("h", "k", "sum", "printed")} for row in rows if row["printed"]]
     write_table(rows, out / "table-1.csv")
-    print(out / "table-1.csv")
+    steps = sorted({row["k"] for row in rows}, reverse=True)
+    cells = {(row["h"], row["k"]): rf"\num{{{row['sum']:#.4g}}} (\num{{{row['printed']:#.4g}}})" for row in rows}
+    lines = [[rf"\num{{{np.sqrt(2.0) / h:.0f}}}", *(cells.get((h, k), "") for k in steps)]
+             for h in sorted({row["h"] for row in rows}, reverse=True)]
+    text = latex.tabular(["$n$", *(rf"$k = \num{{{k:g}}}$" for k in steps)], lines)
+    (out / "table-1.tex").write_text(text + "\n", encoding="utf-8")
+    print(out / "table-1.csv", out / "table-1.tex", sep="\n")
 
 
 def draw_figure_3(rows):
-    figure, axes = plt.subplots(figsize=(5.4, 4.2), layout="constrained")
+    figure, axes = plt.subplots(figsize=(COLUMN, 1.15 * COLUMN), layout="constrained")
     converge.draw_sums(axes, rows)
+    axes.set_title("", loc="left")
     converge.finish(axes)
-    axes.legend(fontsize="small")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.45, -0.22), ncols=2, fontsize="small", columnspacing=1.0)
     return figure
 
 
 def sheet(found, out):
-    """All figures on one page, with their captions."""
-    pictures = [(number, path) for number in sorted(found) for path in found[number]]
-    columns = 3 if len(pictures) % 3 == 0 else 5
-    lines = -(-len(pictures) // columns)
-    page, grid = plt.subplots(lines, columns, figsize=(5.5 * columns, 4.4 * lines), squeeze=False,
-                              layout="constrained")
-    for axes, (number, path) in zip(grid.flat, pictures):
-        axes.axis("off")
-        axes.imshow(plt.imread(path))
-        axes.set_title(f"Figure {number}. {CAPTIONS[number]}", fontsize=8.5, loc="left")
+    """All figures on one page in their own size, beside each other where there is room, with their captions."""
+    size, line, lines = 7.5, 0.14, []
+    for number in sorted(found):
+        for path in found[number]:
+            image = plt.imread(path)
+            high, wide = np.array(image.shape[:2]) / DPI
+            text = wrapped(f"Figure {number}. {CAPTIONS[number]}", wide - 0.1, size)
+            if not lines or sum(of[2] for of in lines[-1]) + wide > PAGE + 0.01:
+                lines.append([])
+            lines[-1].append((image, high, wide, text))
+    heads = [line * (1.0 + max(len(text) for *_, text in of)) for of in lines]
+    heights = [head + max(high for _, high, *_ in of) + 0.1 for head, of in zip(heads, lines)]
+    page, top = plt.figure(figsize=(PAGE, sum(heights))), 0.0
+    for of, head, height in zip(lines, heads, heights):
+        x = 0.0
+        for image, high, wide, text in of:
+            page.text((x + 0.05) / PAGE, 1.0 - (top + 0.04) / sum(heights), "\n".join(text), size=size, va="top")
+            axes = page.add_axes((x / PAGE, 1.0 - (top + head + high) / sum(heights), wide / PAGE, high / sum(heights)))
+            axes.imshow(image, interpolation="none")
+            axes.axis("off")
+            x += PAGE - COLUMN
+        top += height
     written(page, out, "sheet")
 
 
@@ -150,6 +188,7 @@ def main():
     arguments = parser.parse_args()
     out = arguments.out
     out.mkdir(parents=True, exist_ok=True)
+    drawing.use(width=COLUMN, titles=False)
     found = figures(arguments.binary, out)
     if not arguments.quick:
         rows = converge.errors_of_table_1(arguments.binary)

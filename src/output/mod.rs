@@ -135,7 +135,8 @@ const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json
 const MADE: &str = "report.html report.pdf open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
-     force-displacement-together mesh pressure principal-stresses setting stress stress-damage";
+     force-displacement-together mesh pressure pressure-together principal-stresses setting stress \
+     stress-damage";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
 /// The name of a file without its ending, in two parts at the first `_`; and the ending.

@@ -96,7 +96,7 @@ fn a_folder_full_of_modules_and_settings_of_strangers() {
         &["plot", "out/scene", "--along", "top"],
         &["plot", "out/scene", "--paraview"],
         &["report", "out/scene", "--pdf"],
-        &["study", "scene.toml", "--set", "time.end=0.1,0.2"],
+        &["study", "scene.toml", "--set", "time.end=0.1,0.2", "--plot", "work"],
         &["compare", "scene.toml", "--solvers", "active-set"],
         &["export", "scene.toml", "--out", "matrices"],
         &["keys"],
@@ -175,9 +175,18 @@ fn files_and_links_of_the_user_stay_under_every_writer() {
         (&["run", "scene.toml", "--out", "mine"], "mine", results),
         (&["export", "scene.toml", "--out", "mine"], "mine", made.names("matrices")),
         (
-            &["study", "scene.toml", "--set", "time.end=0.1,0.2", "--out", "mine"],
+            &[
+                "study",
+                "scene.toml",
+                "--set",
+                "time.end=0.1,0.2",
+                "--out",
+                "mine",
+                "--plot",
+                "work",
+            ],
             "mine",
-            names(".locks study.csv"),
+            names(".locks study.csv curves_work.csv curves_work.png"),
         ),
         (
             &["compare", "scene.toml", "--solvers", "tao", "--out", "mine"],
@@ -203,14 +212,18 @@ fn links_in_a_folder_of_results() {
     }
     // The first and the last picture: one writer makes all.
     let pictures = "setting.png force-displacement.png";
-    let writers: [(&[&str], &str); 7] = [
+    let writers: [(&[&str], &str); 8] = [
         (&["plot", "out/scene"], pictures),
         (&["plot", "out/scene", "--animate"], "damage.gif pressure.gif"),
         (
             &["plot", "out/scene", "--along", "top"],
             "curves_along_top_von_mises.csv curves_along_top_von_mises.png",
         ),
-        (&["plot", "out/scene", "--together"], "force-displacement-together.png"),
+        (
+            &["plot", "out/scene", "--together"],
+            "force-displacement-together.png pressure-together.png",
+        ),
+        (&["plot", "out/scene", "--figure", "work"], "curves_work.csv curves_work.png"),
         (&["plot", "out/scene", "--paraview"], "open_in_paraview.py"),
         (&["report", "out/scene", "--pdf"], "report.html report.pdf"),
         (&["run", "scene.toml"], "history.csv setting.png scene.toml checkpoint_3_0"),

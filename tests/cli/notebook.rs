@@ -55,7 +55,18 @@ assert abs(found.M.sum() - 1) < 1e-12 and len(found.triangles) == 32
 try:
     run(scene, out='out/dict', material={'young': -1})
 except RuntimeError as error:
-    assert 'material.young' in str(error)
+    assert 'material.young' in str(error) and str(error).startswith('the scene'), error
+assert path.animate('damage', 'damage.gif', rate=10) == path.animate('stress_yy', 'damage.gif', factor=2)
+try:
+    path.animate('damage', 'scene.toml')
+except ValueError as error:
+    assert 'gif or mp4' in str(error)
+open('mine.gif', 'w').write('mine')
+try:
+    path.animate('damage', 'mine.gif')
+except OSError as error:
+    assert 'move it away' in str(error)
+assert open('mine.gif').read() == 'mine'
 print('all')
 ";
     if let Some(said) = python(&directory, &["-c", program]) {

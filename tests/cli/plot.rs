@@ -155,7 +155,8 @@ fn a_body_without_damage_is_not_told_of_damage() {
     assert!(names.iter().any(|name| name == "stress.gif"), "{names:?}");
     assert!(!names.iter().any(|name| name.starts_with("damage")), "{names:?}");
     // The next run removes it, and all else that was made of its results.
-    let of_results = ["stress.gif", "report.pdf", "report.html", "force-displacement-together.svg"];
+    let of_results =
+        ["stress.gif", "report.pdf", "report.html", "pressure-together.svg", "curves_work.csv"];
     of_results.iter().for_each(|name| directory.write(&format!("out/scene/{name}"), ""));
     directory.run(&[]);
     assert!(!directory.names("out/scene").iter().any(|name| of_results.contains(&name.as_str())));
@@ -263,7 +264,76 @@ fn one_picture_and_the_forces_of_several_runs_are_drawn_alone() {
         "{refused:?}"
     );
     let said = directory.say(&["plot", "out/one", "out/two", "--together", "--format", "svg"]);
-    assert_eq!(said.out, "out/one/force-displacement-together.svg\n");
+    let together = "out/one/pressure-together.svg\nout/one/force-displacement-together.svg\n";
+    assert_eq!(said.out, together);
+    let refused = directory.say(&["plot", "out/one", "--together", "--only", "setting"]);
+    refused.fails(2, &["--together draws pressure and force-displacement"]);
+}
+
+/// Static runs, also without frames, have pressures; without a foundation there is nothing to draw.
+#[test]
+fn static_runs_are_drawn_together() {
+    let directory = TestDirectory::new();
+    let (elastic, damage) = SCENE.split_once("[damage]").expect("a table");
+    let (_, contact) = damage.split_once("[contact]").expect("a table");
+    let scene = format!("{elastic}[contact]{contact}").replace("-3*t", "-3");
+    directory.write("scene.toml", &scene);
+    let words =
+        ["study", "scene.toml", "--set", "boundary.top.traction=[0, -3],[0, '-6*x']", "--out"];
+    let Some(said) = directory.say_python(&[&words[..], &["out/s"]].concat()) else { return };
+    assert_eq!(said.code, Some(0), "{said:?}");
+    let said = directory.say(&["plot", "out/s", "--together", "--format", "svg"]);
+    assert!(said.code == Some(0) && said.out.ends_with("/pressure-together.svg\n"), "{said:?}");
+    let clamped = scene.replace("gap = \"0\"", "displacement = [0, 0]");
+    directory.write("scene.toml", &clamped);
+    directory.run(&["--out", "out/clamped"]);
+    let said = directory.say(&["plot", "out/clamped", "--together"]);
+    said.fails(2, &["nothing to draw together"]);
+}
+
+/// The abscissa of the forces is the displacement of the boundary that drives the body, a clamp or a foundation, if there is one.
+#[test]
+fn forces_are_drawn_over_the_displacement_of_the_driven_boundary() {
+    let directory = TestDirectory::new();
+    let scene = directory.read("scene.toml");
+    let clamp =
+        scene.replace("traction = [\"0\", \"-3*t\"]", "displacement = [\"free\", \"-v*t\"]");
+    let base = scene.replace("gap = \"0\"", "displacement = [\"free\", 0]");
+    let plate = base.replace("traction = [\"0\", \"-3*t\"]", "gap = \"0.005 - v*t\"");
+    for (name, scene) in [("load", &scene), ("clamp", &clamp), ("plate", &plate)] {
+        let constants = if name == "load" { "" } else { "\n[constants]\nv = 0.01\n" };
+        directory.write(&format!("{name}.toml"), &format!("{scene}{constants}"));
+        let said = directory.say(&["run", &format!("{name}.toml"), "--set", "damage.lambda_u=0"]);
+        assert_eq!(said.code, Some(0), "{said:?}");
+    }
+    let draws = "from histories import draw_forces\n\
+         for name in ('load', 'clamp', 'plate'):\n\
+         \x20   axes = draw_forces([read_results(Path('out') / name)], ['']).axes[0]\n\
+         \x20   print(axes.get_xlabel().split(' (')[0], round(float(axes.lines[0].get_xdata()[-1]), 6))";
+    let Some(said) = python(&directory, draws) else { return };
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines[0].starts_with("largest displacement "), "{said}");
+    assert_eq!(lines[1..], ["displacement of top 1.0", "displacement of top 1.0"]);
+}
+
+/// A run has a colour, and a support a style, also beyond the colours and styles of a short list.
+#[test]
+fn runs_have_colours_and_supports_styles() {
+    let directory = TestDirectory::new();
+    directory.run(&[]);
+    let draws = "from histories import draw_forces\n\
+         results = read_results(Path('out/scene'))\n\
+         names = [f'run {k}' for k in range(12)]\n\
+         lines = [line for line in draw_forces([results] * 12, names).axes[0].lines if 'run' in line.get_label()]\n\
+         of = lambda line: line.get_label().split(', ')\n\
+         colours, styles = {}, {}\n\
+         for line in lines:\n\
+         \x20   run, support = of(line)\n\
+         \x20   colours.setdefault(run, set()).add(str(line.get_color()))\n\
+         \x20   styles.setdefault(support, set()).add(line.get_linestyle())\n\
+         print({len(c) for c in colours.values()}, len({str(c) for c in colours.values()}), {len(s) for s in styles.values()})";
+    let Some(said) = python(&directory, draws) else { return };
+    assert_eq!(said, "{1} 12 {1}\n");
 }
 
 #[test]

@@ -131,6 +131,73 @@ fn a_study_varies_constants_and_cases_have_labels() {
     );
 }
 
+/// A study is drawn while it runs and afterwards: its numbers are those of the table, and a failed run is named.
+#[test]
+fn a_study_is_drawn_over_its_values() {
+    let directory = TestDirectory::new();
+    let study = ["study", "scene.toml", "--out", "out/s", "--plot", "work,bottom.force_y"];
+    let sets =
+        ["--set", "material.poisson=0.3,0.7,0.1", "--set", "boundary.top.traction=[0, -1],[0, -3]"];
+    let Some(said) = directory.say_python(&[&study[..], &sets].concat()) else { return };
+    assert_eq!(said.code, Some(1), "{said:?}");
+    assert!(said.err.contains("lack the failed runs poisson=0.7"), "{said:?}");
+    for name in ["work", "bottom.force_y"] {
+        assert!(directory.path(&format!("out/s/curves_{name}.png")).exists(), "{said:?}");
+    }
+    let numbers = directory.read("out/s/curves_work.csv");
+    let rows: Vec<Vec<&str>> = numbers.lines().map(|row| row.split(',').collect()).collect();
+    assert_eq!(rows[0][..2], ["run", "material.poisson"], "{numbers}");
+    assert!(rows.len() == 5 && rows[0].contains(&"work (J/m)"), "{numbers}");
+    assert!(rows[1..].iter().all(|row| row[1] != "0.7"), "{numbers}");
+
+    let plot = ["plot", "out/s", "--figure", "work", "--format", "svg"];
+    let said = directory.say(&[&plot[..], &["--over", "boundary.top.traction"]].concat());
+    assert_eq!(said.out, "out/s/curves_work.csv\nout/s/curves_work.svg\n", "{said:?}");
+    let picture = directory.read("out/s/curves_work.svg");
+    assert!(picture.contains("[0, -3]") && picture.contains("material.poisson = 0.1"), "{said:?}");
+    directory.say(&[&plot[..], &["--over", "material.young"]].concat()).fails(
+        2,
+        &["--over material.young: the runs do not differ in it; choose material.poisson"],
+    );
+    let wrong = directory.say(&["plot", "out/s", "--figure", "wrok"]);
+    wrong.fails(2, &["no summary has wrok; did you mean work"]);
+    // The table of the study's folder is that of its runs.
+    let table = directory.say(&["table", "out/s", "--columns", "work", "--csv"]);
+    assert!(table.out.lines().count() == 5 && table.err.contains("poisson=0.7"), "{table:?}");
+}
+
+/// Names and units are text for LaTeX, and numbers with their bars are those of siunitx.
+#[test]
+fn a_table_for_latex_compiles() {
+    let directory = TestDirectory::new();
+    directory.run(&["--out", "out/50%_soft"]);
+    let mut summary = directory.summary("out/50%_soft");
+    summary["figures"]["work"]["value"] = 5.35702.into();
+    summary["figures"]["work"]["bar"] = 0.00061.into();
+    summary["figures"]["bottom.force_y"]["value"] = 1.40161e-7.into();
+    summary["figures"]["bottom.force_y"]["bar"] = 2.7e-11.into();
+    summary["figures"]["von_mises_max"]["value"] = 23153.0.into();
+    summary["figures"]["von_mises_max"]["singular"] = "a corner".into();
+    directory.write("out/50%_soft/summary.json", &summary.to_string());
+    let columns = "work,bottom.force_y,von_mises_max";
+    let words = ["table", "out/50%_soft", "--latex", "--columns", columns];
+    let Some(said) = directory.say_python(&words) else { return };
+    for text in [
+        r"run & work (\unit{J/m}) & bottom.force\_y (\unit{N/m}) & von\_mises\_max (\unit{Pa})",
+        r"50\%\_soft & \num{5.3570 +- 0.0007} & \num{1.40161 +- 0.00027 e-7} & \num{23000} singular",
+        r"\toprule",
+    ] {
+        assert!(said.out.contains(text), "no `{text}` in {}", said.out);
+    }
+    let page = r"\documentclass{article}\usepackage{booktabs,siunitx}\begin{document}";
+    directory.write("page.tex", &format!("{page}\n{}\\end{{document}}\n", said.out));
+    let mut pdflatex = Command::new("pdflatex");
+    let pdflatex = pdflatex.args(["-interaction=nonstopmode", "-halt-on-error", "page.tex"]);
+    let Ok(made) = pdflatex.current_dir(directory.path(".")).output() else { return };
+    let log = String::from_utf8_lossy(&made.stdout).into_owned();
+    assert!(made.status.success() || log.contains("not found"), "{log}");
+}
+
 #[test]
 fn figures_stand_with_units_bars_and_singular_flags() {
     // The bar is rounded up, the figure to the bar's digit; a figure without a bar stands as it was, an extreme
