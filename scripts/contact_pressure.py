@@ -23,7 +23,7 @@ def draw_pressure(results, limits, figure=None):
     lines = -(-len(curves) // count)
     panel = (width - left - count * right) / count
     # Pictures of one row are as high as other plots.
-    high = max(min(3.0, 0.42 * width) if lines == 1 else 0.0, 10.0 * em())
+    high = max(min(3.0, 0.42 * width, OPTIONS.height) if lines == 1 else 0.0, 10.0 * em())
     pressure, gap = 0.7 * high, 0.3 * high
     columns = [(left, panel, right)] + [(0.0, panel, right)] * (count - 1)
     rows = [(top, pressure, 1.8 * em()), (0.0, gap, bottom)] * lines

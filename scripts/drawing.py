@@ -60,7 +60,7 @@ plt.rcParams.update({
 })
 
 # What the command line asks of pictures: their width, inches, or None for widths of their own; the size of letters,
-# points, or None for one that suits the width; the largest height of maps, inches; whether they have titles, and in
+# points, or None for one that suits the width; the largest height of maps and panels, inches; whether they have titles, and in
 # these the name of the run; whether maps have contour lines; the column of history.csv over which forces are drawn, and
 # the smallest and the largest stress of the colours, Pa, or None to choose.
 OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
@@ -207,6 +207,13 @@ def draw_maps(maps, caption, units, figure=None, below=0.0):
     return figure
 
 
+def inch_of(box, below=0.0):
+    """The length of an inch of a picture with one map of this box, without a colour bar and a title, m."""
+    left, right, top, bottom = (em() * of for of in AROUND_MAPS)
+    room = wide(7.2) - left - right, OPTIONS.height - below - top - bottom
+    return (np.ptp(_with_margin(box), axis=0) / room).max()
+
+
 def _with_margin(box):
     air = 0.05 * np.ptp(box, axis=0).max()
     return np.array([box[0] - air, box[1] + air])
@@ -280,9 +287,13 @@ def stress_unit(largest, units):
 
 
 def mesh_of(results, points):
-    """The flat pieces of the shown elements, for these positions of the nodes."""
-    hidden = np.repeat(~results.shown, results.pieces.cuts**2)
-    return Triangulation(*results.pieces.at_points(points).T, results.pieces.triangles, hidden)
+    """The flat pieces of the shown elements, for these positions of the nodes, material by material: a triangle covers
+    half a pixel of those before it, so that others would leave specks along interfaces."""
+    hidden, triangles = np.repeat(~results.shown, results.pieces.cuts**2), results.pieces.triangles
+    if results.materials is not None:
+        order = np.repeat(results.materials, results.pieces.cuts**2).argsort(kind="stable")
+        hidden, triangles = hidden[order], triangles[order]
+    return Triangulation(*results.pieces.at_points(points).T, triangles, hidden)
 
 
 def stress_colours(results, top):
@@ -356,10 +367,12 @@ def least_zeta(low):
 
 
 def along(points, units):
-    """A coordinate along a path: x or y if the path follows this axis, otherwise arc length."""
+    """A coordinate along a path: x or y if the path follows this axis, otherwise arc length between its named ends."""
     unit = units["length"]
     for k, (name, other) in enumerate(("xy", "yx")):
         if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):
             return points[:, k], f"{name} ({unit}) along {other} = {points[0, 1 - k]:g}"
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength ({unit})"
+    first, last = (f"({x:.4g}, {y:.4g})" for x, y in points[[0, -1]])
+    way = f"once round from {first}" if first == last else f"{first} → {last}"
+    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength ({unit}), {way}"

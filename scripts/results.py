@@ -1,14 +1,16 @@
 """A state of a run and its geometry, for pictures."""
 
 import csv
+import re
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from bars import barred, plain
+from bars import LEAST_BAR, barred, plain
 from elements import Pieces
 from signorini_results import paths
 from signorini_summaries import flag_of, option_of, units_of
@@ -18,6 +20,9 @@ from table import write_table  # noqa: F401
 ROUNDING = 1e-9
 # ζ closer to 1 than this is undamaged.
 UNDAMAGED = 1e-12
+# The name of a surface, in a geometry or among the $PhysicalNames of a mesh, which stand in its first bytes.
+SURFACE = re.compile(r'Physical\s+Surface\s*\(\s*"([^"]+)"|^2 \d+ "([^"]+)"', re.MULTILINE)
+FIRST_BYTES = 1 << 16
 
 
 def read_table(path, texts=()):
@@ -158,11 +163,38 @@ class Results:
         tables = [self.scene.get(table, {}) for table in ("material", "damage")]
         return ["material", *sorted({name for table in tables for name, of in table.items() if isinstance(of, dict)})]
 
+    @property
+    def materials_there(self):
+        """The names of the materials that the body has."""
+        return ["material"] if self.materials is None else [self.material_names[k] for k in np.unique(self.materials)]
+
+    def surface(self, material):
+        """The name of a material in texts. The rest of the body has the name of its surface, if it is a single one."""
+        others = set(surfaces_of(self.folder)) - set(self.material_names)
+        return others.pop() if material == "material" and len(others) == 1 else material
+
+    @property
+    def figures(self):
+        """The figures of the summary, zeros in place of rounding errors: without ζ if the scene has no damage, and with the
+        sum of the contact reactions if there are several foundations."""
+        figures = self.summary.get("figures", {})
+        left_out = ["contact_force"] if sum(name.endswith(".contact_length") for name in figures) < 2 else []
+        scales = {}
+        for of in figures.values():
+            scales[of["unit"]] = max(scales.get(of["unit"], 0.0), abs(of["value"] or 0.0))
+        # A moment has the size of a force at the other end of the body.
+        moment, force = self.units["force"], self.units["line"]
+        scales[moment] = max(scales.get(moment, 0.0), scales.get(force, 0.0) * self.size)
+        is_damaged = not self.scene or "damage" in self.scene
+        return {name: _without_roundoff(of, scales[of["unit"]]) for name, of in figures.items() if name not in left_out
+                and (is_damaged or not name.rpartition(".")[2].startswith("zeta"))}
+
     def elasticity(self, name="material"):
         """The elastic constants of a material, in words."""
         general = self.scene.get("material", {})
         of = {**general, **general.get(name, {})}
-        words = [f"E = {of['young']:g} {self.units['stress']}", f"ν = {of['poisson']:g}"] if "young" in of else []
+        young = f"{of['young']:g}".replace("e+", "e").replace("e0", "e") if "young" in of else ""
+        words = [f"E = {young} {self.units['stress']}", f"ν = {of['poisson']:g}"] if young else []
         return ", ".join(words + ([f"ρ = {of['density']:g}"] if of.get("density") else []))
 
     @property
@@ -295,6 +327,31 @@ def of_material(results):
         results, summary={**results.summary, "figures": own(results.summary.get("figures"))},
         zeta=np.where(inside, results.zeta, results.zeta[inside].max()), von_mises=results.von_mises * inside,
         principal=results.principal * inside[:, None])
+
+
+@cache
+def surfaces_of(folder):
+    """The names of the surfaces of the mesh, from the geometries and meshes in a folder of results. Names that a geometry
+    computes are missing."""
+    found = set()
+    for path in (*folder.glob("*.geo"), *folder.glob("*.msh")):
+        with open(path, encoding="utf-8", errors="replace") as file:
+            found |= {geometry or mesh for geometry, mesh in SURFACE.findall(file.read(FIRST_BYTES))}
+    return frozenset(found)
+
+
+def _without_roundoff(figure, scale):
+    """A figure, and its extreme over all steps, that are 0 if they are within a bar or a rounding error far below the
+    `scale` of other figures in its unit."""
+    bar = figure["bar"] or 0.0
+    noise = max(bar if bar <= LEAST_BAR * scale else 0.0, ROUNDING * scale)
+
+    def rounded(of):
+        value = of["value"]
+        return {**of, "value": 0.0} if value is not None and abs(value) <= noise else of
+
+    figure = {**rounded(figure), "governing": figure["governing"] and rounded(figure["governing"])}
+    return {**figure, "bar": None} if figure["value"] == 0.0 and (bar <= noise or scale == 0.0) else figure
 
 
 def without_roundoff(results):
