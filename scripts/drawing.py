@@ -62,9 +62,11 @@ plt.rcParams.update({
 # What the command line asks of pictures: their width, inches, or None for widths of their own; the size of letters,
 # points, or None for one that suits the width; the largest height of maps and panels, inches; whether they have titles, and in
 # these the name of the run; whether maps have contour lines; the column of history.csv over which forces are drawn, and
-# the smallest and the largest stress of the colours, Pa, or None to choose.
+# the smallest and the largest stress of the colours, Pa, or None to choose; the corners of the part that maps show, (2, 2), m.
 OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
-                          range=None)
+                          range=None, zoom=None)
+# Maps of bodies whose sides have a larger ratio are stretched across, to about this ratio.
+SLENDER = 15.0
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
 # top, bottom), in the size of letters. They fit numbers of six digits.
 LINE = 1.35
@@ -168,21 +170,29 @@ def plot(caption="", figure=None, height=0.6, below=0.0):
 
 @dataclass
 class Map:
-    """A map of the body: its title, the corners of its box, (2, 2), a function that draws it into axes, and whether it
-    has a colour bar."""
+    """A map of the body: its title, the corners of its box, (2, 2), a function that draws it into axes, whether it
+    has a colour bar, and whether it is a field, which may be zoomed and stretched."""
 
     title: str
     box: np.ndarray
     paint: Callable
     has_bar: bool = True
+    is_field: bool = True
 
 
 def draw_maps(maps, caption, units, figure=None, below=0.0):
     """A picture of maps with one scale, in that number of columns in which they are largest."""
     left, right, top, bottom = (em() * of for of in AROUND_MAPS)
     right = BAR * em() if any(of.has_bar for of in maps) else right
-    boxes = [_with_margin(of.box) for of in maps]
-    extent = np.max([np.ptp(box, axis=0) for box in boxes], axis=0)
+    is_field = all(of.is_field for of in maps)
+    boxes = [_with_margin(of.box) if OPTIONS.zoom is None or not is_field else np.array(OPTIONS.zoom) for of in maps]
+    stretch = _stretch(np.max([np.ptp(of.box if OPTIONS.zoom is None else box, axis=0) for of, box in zip(maps, boxes)], axis=0))
+    if is_field and max(stretch) > 1.0:
+        boxes = [_with_margin(of.box, stretch) if OPTIONS.zoom is None else box for of, box in zip(maps, boxes)]
+        caption += "".join(f"; {name} × {scale:g}: stretched" for name, scale in zip("xy", stretch) if scale > 1.0)
+    else:
+        stretch = np.ones(2)
+    extent = stretch * np.max([np.ptp(box, axis=0) for box in boxes], axis=0)
     most = wide(7.2 if len(maps) == 1 else 11.0)
 
     def scale(columns):
@@ -201,7 +211,7 @@ def draw_maps(maps, caption, units, figure=None, below=0.0):
                           [of.title for of in maps], below, figure)
     for of, box, one in zip(maps, boxes, axes):
         of.paint(one)
-        frame(one, box, units)
+        frame(one, box, units, stretch)
     for one in axes[len(maps):]:
         one.remove()
     return figure
@@ -214,16 +224,24 @@ def inch_of(box, below=0.0):
     return (np.ptp(_with_margin(box), axis=0) / room).max()
 
 
-def _with_margin(box):
-    air = 0.05 * np.ptp(box, axis=0).max()
+def _with_margin(box, stretch=1.0):
+    air = 0.05 * (stretch * np.ptp(box, axis=0)).max() / stretch
     return np.array([box[0] - air, box[1] + air])
 
 
-def frame(axes, box, units):
-    """Sets equal aspect around a box, with few ticks."""
+def _stretch(extent):
+    """The factors of x and y that make a slender box visible: 1, 2 or 5 times a power of ten."""
+    ratio = extent.max() / (SLENDER * extent.min()) if extent.min() > 0.0 else 1.0
+    power = 10.0 ** np.floor(np.log10(max(ratio, 1.0)))
+    factor = power * min(m for m in (1, 2, 5, 10) if m * power >= ratio * (1 - 1e-12)) if ratio > 1.0 else 1.0
+    return np.where(extent < extent.max(), factor, 1.0)
+
+
+def frame(axes, box, units, stretch=(1.0, 1.0)):
+    """Sets equal aspect around a box that is stretched so, with few ticks."""
     axes.set_xlim(box[:, 0])
     axes.set_ylim(box[:, 1])
-    axes.set_aspect("equal", anchor="NW")
+    axes.set_aspect(stretch[1] / stretch[0], anchor="NW")
     for axis, name, room, ticks in zip((axes.xaxis, axes.yaxis), "xy", _size_of(axes), (5.0, 2.5)):
         axis.set_major_locator(MaxNLocator(int(np.clip(room / (ticks * em()), 1, 6)), steps=[1, 2, 5, 10]))
         axis.set_label_text(f"{name} ({units['length']})")

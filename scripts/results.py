@@ -20,6 +20,8 @@ from table import write_table  # noqa: F401
 ROUNDING = 1e-9
 # ζ closer to 1 than this is undamaged.
 UNDAMAGED = 1e-12
+# Angles, radians, below which an obstacle is flat.
+FLAT = 1e-6
 # The name of a surface, in a geometry or among the $PhysicalNames of a mesh, which stand in its first bytes.
 SURFACE = re.compile(r'Physical\s+Surface\s*\(\s*"([^"]+)"|^2 \d+ "([^"]+)"', re.MULTILINE)
 FIRST_BYTES = 1 << 16
@@ -239,6 +241,10 @@ class Results:
         largest = self.summary.get("figures", {}).get(name) or {}
         return largest.get("singular") if self.is_last else None
 
+    def peak_of(self, curve):
+        """The figure of the largest pressure of the last state on the boundary of a curve; empty without one."""
+        return self.summary.get("figures", {}).get(f"{curve.name}.pressure_max", {})
+
     @property
     def step(self):
         """The row of the state in the history."""
@@ -297,13 +303,47 @@ class Results:
         """The obstacle as polylines, for displacements amplified by `factor`.
 
         To scale, the point opposite a node x of Γ_C is x + g ν. A node touches the obstacle if u·ν = g. So that it also
-        does so amplified, the distance is amplified, and the point follows the sliding of the body, as far as this is
-        amplified: x + factor g ν + (factor − 1) (u·τ) τ.
+        does so amplified, the distance is amplified: x + factor g ν. A flat obstacle with one gap is this line, which touches
+        the same nodes wherever they slide along it: it stays at its place, however the body moves. On another
+        obstacle a node that slides meets other points, so these follow its sliding, as far as this is amplified:
+        x + factor g ν + (factor − 1) (u·τ) τ.
         """
-        sliding = (self.displacement_at(self.contact) * self.tangents).sum(axis=2, keepdims=True) * self.tangents
-        lines = self.contact + factor * (self.obstacle - self.contact) + (factor - 1.0) * sliding
-        lines = np.round(lines, 12)
-        return [np.array(path) for path in paths([tuple(map(tuple, l)) for l in lines.tolist()])]
+        data = np.round(np.concatenate((self.contact, self.obstacle, self.tangents), axis=2), 12)
+        return [self._part(*np.hsplit(np.array(path), 3), factor)
+                for path in paths([tuple(map(tuple, edge)) for edge in data.tolist()])]
+
+    def _part(self, nodes, opposite, tangents, factor):
+        """A connected part of the amplified obstacle."""
+        displacement = self.displacement_at(nodes)
+        sliding = (factor - 1.0) * (displacement * tangents).sum(axis=1, keepdims=True) * tangents
+        line = nodes + factor * (opposite - nodes)
+        edges = np.diff(line, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        turns = [edges[:, 0] * tau[:, 1] - edges[:, 1] * tau[:, 0] for tau in (tangents[:-1], tangents[1:])]
+        if (np.abs(turns) > FLAT * lengths).any():
+            return np.round(line + sliding, 12)
+        # The body is on the left of the line from its first end, and on the right from the other.
+        still, data = line, (line, nodes, opposite - nodes - displacement, sliding)
+        for side, order in ((1, slice(None)), (-1, slice(None, None, -1))):
+            still = self._with_end(still[order], *(of[order] for of in data), side, factor)[order]
+        return np.round(still if len(still) > 1 else line + sliding, 12)
+
+    def _with_end(self, still, line, nodes, distance, sliding, side, factor):
+        """A flat obstacle with its first end at its place, if it can be there: it is shorter where the body beside it, which
+        has slid here, would be drawn behind the obstacle, and longer where touching nodes have slid beyond it."""
+        inwards = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+        outwards = side * np.array([inwards[1], -inwards[0]])
+        visible, slid = 1e-3 * self.size, sliding[0] @ inwards
+        from_end = self.places(factor) - line[0]
+        is_behind = (from_end @ outwards > visible) & ((self.nodes - nodes[0]) @ outwards <= visible)
+        is_beside = (from_end @ inwards > 0.0) & (from_end @ inwards < slid)
+        touches = np.abs(distance @ outwards) <= ROUNDING * np.linalg.norm(self.displacement, axis=1).max()
+        reached = ((line + sliding - line[0]) @ inwards)[touches].min(initial=0.0)
+        end = slid if (is_behind & is_beside).any() else reached
+        if end == 0.0:
+            return still
+        beyond = still[(still - line[0]) @ inwards > end]
+        return np.vstack([line[0] + end * inwards, beyond]) if len(beyond) else beyond
 
 
 def amplification(size, largest):

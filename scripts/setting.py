@@ -90,7 +90,7 @@ def draw_setting(results, _limits, figure=None):
 
     loads = f"; loads at {replace(results, time=time).moment}" if largest or "body" in results.scene else ""
     box = np.array([points.min(axis=0), points.max(axis=0)])
-    return draw_maps([Map("", box, paint, has_bar=False)], headline(results, f"setting{loads}"), units, figure, below)
+    return draw_maps([Map("", box, paint, has_bar=False, is_field=False)], headline(results, f"setting{loads}"), units, figure, below)
 
 
 def _entries(results):
@@ -275,9 +275,9 @@ def _outwards(line, name, others, inch):
 
 
 def _beside(point, name, inch):
-    """Places of the name of a probe in the four corners beside it."""
-    return [_aligned(point + 0.5 * AWAY * inch * np.array([x, y]), {"ha": across, "va": upright}, name, inch)
-            for y, upright in ((1, "bottom"), (-1, "top")) for x, across in ((1, "left"), (-1, "right"))]
+    """Places of the name of a probe in the four corners beside it, the nearest first."""
+    return [_aligned(point + (0.5 + k) * AWAY * inch * np.array([x, y]), {"ha": across, "va": upright}, name, inch)
+            for k in range(TRIED) for y, upright in ((1, "bottom"), (-1, "top")) for x, across in ((1, "left"), (-1, "right"))]
 
 
 def _lines(name):

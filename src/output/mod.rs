@@ -135,7 +135,7 @@ const FILES: &str = "contact.csv contact.pvd fields.pvd history.csv summary.json
 const MADE: &str = "report.html report.pdf open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
-     force-displacement-together mesh pressure principal-stresses setting stress stress-damage";
+     force-displacement-together mesh pressure principal-stresses setting stress stress-damage times";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
 /// The name of a file without its ending, in two parts at the first `_`; and the ending.
@@ -157,7 +157,7 @@ fn is_result(name: &str) -> bool {
     }
 }
 
-/// Whether `name` is the name of a report, a curve or a picture, which is `NAME[_tTIME].png`.
+/// Whether `name` is the name of a report, a curve or a picture, which is `NAME[_tTIME][_zoom].png`.
 fn is_made(name: &str) -> bool {
     let [kind, rest, ending] = parts(name);
     match ending {
@@ -165,7 +165,7 @@ fn is_made(name: &str) -> bool {
         "csv" | "png" | "svg" | "pdf" if kind == CURVES => true,
         "png" | "svg" | "pdf" | "gif" | "mp4" => {
             PICTURES.split(' ').any(|known| known == kind)
-                && (rest.is_empty() || rest.starts_with('t'))
+                && (rest.is_empty() || rest.starts_with('t') || rest == "zoom")
         }
         _ => false,
     }
