@@ -65,8 +65,8 @@ plt.rcParams.update({
 # the smallest and the largest stress of the colours, Pa, or None to choose; the corners of the part that maps show, (2, 2), m.
 OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
                           range=None, zoom=None)
-# Maps of bodies whose sides have a larger ratio are stretched across, to about this ratio.
-SLENDER = 15.0
+# Maps of bodies whose sides have a ratio above the first are stretched across, to about the second.
+SLENDER, STRETCHED = 30.0, 15.0
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
 # top, bottom), in the size of letters. They fit numbers of six digits.
 LINE = 1.35
@@ -75,6 +75,8 @@ AROUND_PLOTS = 7.0, 1.8, 1.4, 3.8
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # The least width of pictures that have a width of their own, inches.
 NARROWEST = 6.4
+# The least height of maps over a legend, in the size of letters.
+LEAST_MAPS = 18.0
 # The place to the right of a map for a colour bar, in the size of letters.
 BAR = 6.4
 
@@ -198,7 +200,7 @@ def draw_maps(maps, caption, units, figure=None, below=0.0):
     def scale(columns):
         rows, across = -(-len(maps) // columns), most / columns
         lines = max(len(wrapped(of.title, across - em())) for of in maps)
-        room = across - left - right, (OPTIONS.height - below) / rows - top - lines * LINE * em() - bottom
+        room = across - left - right, _highest(below) / rows - top - lines * LINE * em() - bottom
         return (np.array(room) / extent).min()
 
     count = max(range(1, len(maps) + 1), key=scale)
@@ -217,10 +219,15 @@ def draw_maps(maps, caption, units, figure=None, below=0.0):
     return figure
 
 
+def _highest(below):
+    """The largest height of maps over a legend, which does not take all of it."""
+    return max(OPTIONS.height - below, LEAST_MAPS * em())
+
+
 def inch_of(box, below=0.0):
     """The length of an inch of a picture with one map of this box, without a colour bar and a title, m."""
     left, right, top, bottom = (em() * of for of in AROUND_MAPS)
-    room = wide(7.2) - left - right, OPTIONS.height - below - top - bottom
+    room = wide(7.2) - left - right, _highest(below) - top - bottom
     return (np.ptp(_with_margin(box), axis=0) / room).max()
 
 
@@ -230,11 +237,12 @@ def _with_margin(box, stretch=1.0):
 
 
 def _stretch(extent):
-    """The factors of x and y that make a slender box visible: 1, 2 or 5 times a power of ten."""
-    ratio = extent.max() / (SLENDER * extent.min()) if extent.min() > 0.0 else 1.0
-    power = 10.0 ** np.floor(np.log10(max(ratio, 1.0)))
-    factor = power * min(m for m in (1, 2, 5, 10) if m * power >= ratio * (1 - 1e-12)) if ratio > 1.0 else 1.0
-    return np.where(extent < extent.max(), factor, 1.0)
+    """The factors of x and y that make a slender box visible: 1, or about 1, 2 or 5 times a power of ten."""
+    if extent.max() <= SLENDER * extent.min() or extent.min() <= 0.0:
+        return np.ones(2)
+    ratio = extent.max() / (STRETCHED * extent.min())
+    power = 10.0 ** np.floor(np.log10(ratio))
+    return np.where(extent < extent.max(), power * max(m for m in (1, 2, 5) if m * power <= ratio * (1 + 1e-12)), 1.0)
 
 
 def frame(axes, box, units, stretch=(1.0, 1.0)):
@@ -269,11 +277,20 @@ def draw_outline(axes, points, results, **style):
     axes.add_collection(LineCollection(results.outline(points), capstyle="round", **style))
 
 
+class Strokes(withTickedStroke):
+    """Strokes along a line; none along a line that is shorter than their distance, for which matplotlib fails."""
+
+    def draw_path(self, renderer, gc, path, affine, face=None):
+        points = affine.transform(path.vertices)
+        if np.linalg.norm(np.diff(points, axis=0), axis=1).sum() > renderer.points_to_pixels(self._spacing):
+            super().draw_path(renderer, gc, path, affine, face)
+
+
 def draw_foundation(axes, results, factor=1.0):
     """The obstacle as a thick line, hatched on its far side, for displacements amplified by `factor`."""
     for line in results.foundation(factor):
         # The body is on the left of the line, so the strokes go to the right.
-        strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
+        strokes = Strokes(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
         axes.plot(*line.T, color=INK, linewidth=0.8, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
 

@@ -54,14 +54,14 @@ def _pressure_top(state):
         return state.pressure.max()
     lengths = np.concatenate([np.linalg.norm(np.gradient(of.points, axis=0), axis=1) for of in curves])
     pressure = np.concatenate([curve.pressure for curve in curves])
-    regular = np.concatenate([curve.pressure * ~_is_near_peak(state.peak_of(curve), curve.points) for curve in curves])
+    regular = np.concatenate([curve.pressure * ~is_near_peak(state.peak_of(curve), curve.points) for curve in curves])
     # Without other pressures the peak is the contact.
     regular = regular if regular.max() > LEAST_REST * pressure.max() else pressure
     largest, top = regular.max(), _exceeded_in(0.01, regular, lengths)
     return top if largest > 4.0 * top > 0.0 else largest
 
 
-def _is_near_peak(figure, points):
+def is_near_peak(figure, points):
     """Per node of a contact boundary: is it near a singular pressure, which this figure is, or near the ends?"""
     if not figure.get("singular"):
         return np.full(len(points), False)

@@ -76,7 +76,8 @@ def arguments_of(prog):
         "FORMAT"), help="png, svg, pdf, or several with commas (default: png)")
     parser.add_argument("--line", type=numbers(4), metavar="X0,Y0,X1,Y1", help=(
         "only curves of fields along this line"))
-    parser.add_argument("--along", metavar="BOUNDARY", help="only curves of fields along a boundary")
+    parser.add_argument("--along", metavar="BOUNDARY,…", help=(
+        "only curves of fields along a boundary, or several in one picture; a name with a comma stands in double quotes"))
     parser.add_argument("--quantity", type=lambda text: text.split(","), metavar="NAME,…", help=(
         "fields of --line and --along: zeta, u_x, u_y, stress_xx, stress_yy, stress_xy, stress_zz, stress_1, "
         "stress_2, strain_xx, strain_yy, strain_xy, von_mises, normal_pressure, gap (default: von_mises)"))

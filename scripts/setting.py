@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
-from matplotlib.patheffects import withStroke, withTickedStroke
+from matplotlib.patheffects import withStroke
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, FAINT, GREEN, INK, LINE, RED, Map, draw_foundation, draw_maps, draw_outline, em, headline, inch_of, legend,
+    BLUE, FAINT, GREEN, INK, LINE, RED, Map, Strokes, draw_foundation, draw_maps, draw_outline, em, headline, inch_of, legend,
     room_for_legend, wide, width_of, wrapped,
 )
 from expressions import evaluate
@@ -200,7 +200,7 @@ def _draw_support(axes, line, condition, size):
             axes.add_patch(Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
         axes.plot(*_outside(line, condition, size).T, color=BLUE, linewidth=1.2, zorder=1.8)
     elif "free" not in condition.get("displacement", ["free"]):
-        strokes = withTickedStroke(spacing=6, angle=-135, linewidth=0.9, foreground=BLUE)
+        strokes = Strokes(spacing=6, angle=-135, linewidth=0.9, foreground=BLUE)
         axes.plot(*line.T, color=BLUE, linewidth=0.9, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=BLUE, linewidth=2.0, zorder=2.5, solid_capstyle="butt")
 
