@@ -4,13 +4,13 @@ from decimal import ROUND_CEILING, Decimal
 
 # A bar that is a smaller part of its figure is below the rounding of its digits.
 ROUNDING = 1e-15
-# The smallest bar that is shown, over its figure.
-LEAST_BAR = 1e-6
+# The smallest bar that is shown, over its figure, and the digits of a value that do not come from rounding.
+LEAST_BAR, DIGITS = 1e-6, 14
 
 
 def plain(number, digits=3):
-    """A figure without a bar: 1220, not 1.22e+03."""
-    return f"{float(f'{number:.{digits}g}'):.7g}"
+    """A figure without a bar: 1220, not 1.22e+03, and 2e-6."""
+    return f"{float(f'{number:.{digits}g}'):.7g}".replace("e-0", "e-")
 
 
 def barred(value, bar):
@@ -21,9 +21,11 @@ def barred(value, bar):
     if bar > abs(value) > 0:
         return f"{plain(value, 2)} ± {plain(bar, 2)}"
     bar = max(bar, LEAST_BAR * abs(value))
-    value, bar = Decimal(repr(float(value))), Decimal(repr(float(bar)))
+    value, bar = Decimal(f"{value:.{DIGITS}g}"), Decimal(repr(float(bar)))
     first = bar.adjusted()
     last = first - (bar.scaleb(-first) < 3)
+    if value == 0:
+        return f"0 ± {plain(bar.quantize(Decimal(1).scaleb(last), ROUND_CEILING))}"
     power = max(value, bar, key=abs).adjusted()
     power = 0 if -3 <= power <= 6 else power
     unit = Decimal(1).scaleb(last - power)

@@ -3,12 +3,14 @@
 import numpy as np
 
 from drawing import (
-    AROUND_PLOTS, BAR, BLUE, FAINT, NARROWEST, OPTIONS, along, canvas, colours, draw_colourbar, em, headline, legend,
+    AROUND_PLOTS, BAR, BLUE, FAINT, NARROWEST, OPTIONS, RED, along, canvas, colours, draw_colourbar, em, headline, legend,
     power_of, room_for_legend, stress_unit, times_power, wide,
 )
 
 # The least width of a panel, in the size of letters; panels of many boundaries stand in several rows.
 LEAST = 7.5
+# The end of an axis over the largest value that it shows.
+TOP = 1.08
 
 
 def draw_pressure(results, limits, figure=None):
@@ -23,7 +25,7 @@ def draw_pressure(results, limits, figure=None):
     lines = -(-len(curves) // count)
     panel = (width - left - count * right) / count
     # Pictures of one row are as high as other plots.
-    high = max(min(3.0, 0.42 * width) if lines == 1 else 0.0, 10.0 * em())
+    high = max(min(3.0, 0.42 * width, OPTIONS.height) if lines == 1 else 0.0, 10.0 * em())
     pressure, gap = 0.7 * high, 0.3 * high
     columns = [(left, panel, right)] + [(0.0, panel, right)] * (count - 1)
     rows = [(top, pressure, 1.8 * em()), (0.0, gap, bottom)] * lines
@@ -33,13 +35,15 @@ def draw_pressure(results, limits, figure=None):
     figure, axes = canvas(columns, rows, headline(results, _contact(results, limits, factor, unit)),
                           names if OPTIONS.titles else (), figure=figure)
     power = power_of(limits.gap)
-    for k, curve in enumerate(curves):
+    bars = [results.is_last and results.peak_of(curve).get("bar") or 0.0 for curve in curves]
+    highest = (limits.pressure + max(bars)) / factor
+    for k, (curve, bar) in enumerate(zip(curves, bars)):
         above, below = (axes[(2 * (k // count) + part) * count + k % count] for part in (0, 1))
-        _draw_curve(above, below, curve, factor, 10.0**power, panel)
+        _draw_curve(above, below, curve, factor, 10.0**power, panel, bar / factor, highest)
         below.set_xlabel(along(curve.points, results.units)[1])
         above.tick_params(labelbottom=False, labelleft=k % count == 0)
         below.tick_params(labelleft=k % count == 0)
-        _scale(above, limits.pressure / factor)
+        _scale(above, highest)
         _scale(below, limits.gap / 10.0**power)
         if k % count == 0:
             above.set_ylabel(f"pressure ({unit})")
@@ -84,7 +88,7 @@ def draw_pressures(runs, names, figure=None):
 
 
 def _contact(results, limits, factor, unit):
-    """The caption: the number of nodes in contact, and a pressure that is not shown."""
+    """The caption: the number of nodes in contact, a pressure that is not shown, and the bars."""
     if results.unloaded:
         return f"contact at {results.moment}, unloaded"
     if results.active is None:
@@ -92,12 +96,17 @@ def _contact(results, limits, factor, unit):
     text = f"contact at {results.moment}; filled: {results.active} of {results.summary.get('contact_nodes', '?')} nodes"
     largest = results.pressure.max()
     if largest > limits.pressure > 0.0:
-        text += f"; the pressure goes up to {results.said('pressure_max', largest, factor)} {unit}"
+        is_singular = any(results.peak_of(curve).get("singular") for curve in results.curves)
+        text += "; ▲: clipped, " + "singular, " * is_singular + (
+            f"up to {results.said('pressure_max', largest, factor)} {unit}" + " on this mesh" * is_singular)
+    if results.is_last and any(results.peak_of(curve).get("bar") for curve in results.curves):
+        text += "; band: bar of the largest pressure"
     return text
 
 
-def _draw_curve(above, below, curve, stress, length, width):
-    """Pressure and gap, in these units, along a part of a boundary, in panels of this width, inches."""
+def _draw_curve(above, below, curve, stress, length, width, bar, top):
+    """Pressure and gap, in these units, along a part of a boundary, in panels of this width, inches; with a band for the bar
+    of pressures, and marks of pressures above the top."""
     s, _ = along(curve.points, {"length": ""})
     pressure, gap = curve.pressure / stress, curve.gap / length
     active = curve.active & (pressure > 0.0)
@@ -113,6 +122,12 @@ def _draw_curve(above, below, curve, stress, length, width):
         axes.margins(x=0.03)
         axes.locator_params("x", nbins=int(np.clip(width / (5.0 * em()), 1, 6)))
     above.fill_between(s, 0.0, pressure, color=BLUE, alpha=0.12, linewidth=0)
+    if bar:
+        above.fill_between(s, np.maximum(pressure - bar, 0.0), pressure + bar, where=active, color=BLUE, alpha=0.25, linewidth=0)
+    clipped = np.flatnonzero(pressure > TOP * top) if top > 0.0 else []
+    # One mark for neighbours.
+    for group in np.split(clipped, np.flatnonzero(np.diff(clipped) > 1) + 1) if len(clipped) else ():
+        above.plot(s[group[pressure[group].argmax()]], TOP * top, marker="^", color=RED, markersize=6, clip_on=False, zorder=4)
 
 
 def _corners(points):
@@ -130,7 +145,7 @@ def _names(curves):
 def _scale(axes, largest):
     """Scales the axis from 0 to the largest value; the axis of a zero field has the tick 0 only."""
     if largest > 0.0:
-        axes.set_ylim(-0.08 * largest, 1.08 * largest)
+        axes.set_ylim((1.0 - TOP) * largest, TOP * largest)
         axes.locator_params("y", nbins=int(np.clip(axes.get_position().height * axes.figure.get_size_inches()[1]
                                                    / (2.5 * em()), 1, 6)))
     else:

@@ -60,11 +60,13 @@ plt.rcParams.update({
 })
 
 # What the command line asks of pictures: their width, inches, or None for widths of their own; the size of letters,
-# points, or None for one that suits the width; the largest height of maps, inches; whether they have titles, and in
+# points, or None for one that suits the width; the largest height of maps and panels, inches; whether they have titles, and in
 # these the name of the run; whether maps have contour lines; the column of history.csv over which forces are drawn, and
-# the smallest and the largest stress of the colours, Pa, or None to choose.
+# the smallest and the largest stress of the colours, Pa, or None to choose; the corners of the part that maps show, (2, 2), m.
 OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
-                          range=None)
+                          range=None, zoom=None)
+# Maps of bodies whose sides have a ratio above the first are stretched across, to about the second.
+SLENDER, STRETCHED = 30.0, 15.0
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
 # top, bottom), in the size of letters. They fit numbers of six digits.
 LINE = 1.35
@@ -73,6 +75,8 @@ AROUND_PLOTS = 7.0, 1.8, 1.4, 3.8
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # The least width of pictures that have a width of their own, inches.
 NARROWEST = 6.4
+# The least height of maps over a legend, in the size of letters.
+LEAST_MAPS = 18.0
 # The place to the right of a map for a colour bar, in the size of letters.
 BAR = 6.4
 
@@ -173,27 +177,35 @@ def plot(caption="", figure=None, height=0.6, below=0.0):
 
 @dataclass
 class Map:
-    """A map of the body: its title, the corners of its box, (2, 2), a function that draws it into axes, and whether it
-    has a colour bar."""
+    """A map of the body: its title, the corners of its box, (2, 2), a function that draws it into axes, whether it
+    has a colour bar, and whether it is a field, which may be zoomed and stretched."""
 
     title: str
     box: np.ndarray
     paint: Callable
     has_bar: bool = True
+    is_field: bool = True
 
 
 def draw_maps(maps, caption, units, figure=None, below=0.0):
     """A picture of maps with one scale, in that number of columns in which they are largest."""
     left, right, top, bottom = (em() * of for of in AROUND_MAPS)
     right = BAR * em() if any(of.has_bar for of in maps) else right
-    boxes = [_with_margin(of.box) for of in maps]
-    extent = np.max([np.ptp(box, axis=0) for box in boxes], axis=0)
+    is_field = all(of.is_field for of in maps)
+    boxes = [_with_margin(of.box) if OPTIONS.zoom is None or not is_field else np.array(OPTIONS.zoom) for of in maps]
+    stretch = _stretch(np.max([np.ptp(of.box if OPTIONS.zoom is None else box, axis=0) for of, box in zip(maps, boxes)], axis=0))
+    if is_field and max(stretch) > 1.0:
+        boxes = [_with_margin(of.box, stretch) if OPTIONS.zoom is None else box for of, box in zip(maps, boxes)]
+        caption += "".join(f"; {name} × {scale:g}: stretched" for name, scale in zip("xy", stretch) if scale > 1.0)
+    else:
+        stretch = np.ones(2)
+    extent = stretch * np.max([np.ptp(box, axis=0) for box in boxes], axis=0)
     most = wide(7.2 if len(maps) == 1 else 11.0)
 
     def scale(columns):
         rows, across = -(-len(maps) // columns), most / columns
         lines = max(len(wrapped(of.title, across - em())) for of in maps)
-        room = across - left - right, (OPTIONS.height - below) / rows - top - lines * LINE * em() - bottom
+        room = across - left - right, _highest(below) / rows - top - lines * LINE * em() - bottom
         return (np.array(room) / extent).min()
 
     count = max(range(1, len(maps) + 1), key=scale)
@@ -206,22 +218,43 @@ def draw_maps(maps, caption, units, figure=None, below=0.0):
                           [of.title for of in maps], below, figure)
     for of, box, one in zip(maps, boxes, axes):
         of.paint(one)
-        frame(one, box, units)
+        frame(one, box, units, stretch)
     for one in axes[len(maps):]:
         one.remove()
     return figure
 
 
-def _with_margin(box):
-    air = 0.05 * np.ptp(box, axis=0).max()
+def _highest(below):
+    """The largest height of maps over a legend, which does not take all of it."""
+    return max(OPTIONS.height - below, LEAST_MAPS * em())
+
+
+def inch_of(box, below=0.0):
+    """The length of an inch of a picture with one map of this box, without a colour bar and a title, m."""
+    left, right, top, bottom = (em() * of for of in AROUND_MAPS)
+    room = wide(7.2) - left - right, _highest(below) - top - bottom
+    return (np.ptp(_with_margin(box), axis=0) / room).max()
+
+
+def _with_margin(box, stretch=1.0):
+    air = 0.05 * (stretch * np.ptp(box, axis=0)).max() / stretch
     return np.array([box[0] - air, box[1] + air])
 
 
-def frame(axes, box, units):
-    """Sets equal aspect around a box, with few ticks."""
+def _stretch(extent):
+    """The factors of x and y that make a slender box visible: 1, or about 1, 2 or 5 times a power of ten."""
+    if extent.max() <= SLENDER * extent.min() or extent.min() <= 0.0:
+        return np.ones(2)
+    ratio = extent.max() / (STRETCHED * extent.min())
+    power = 10.0 ** np.floor(np.log10(ratio))
+    return np.where(extent < extent.max(), power * max(m for m in (1, 2, 5) if m * power <= ratio * (1 + 1e-12)), 1.0)
+
+
+def frame(axes, box, units, stretch=(1.0, 1.0)):
+    """Sets equal aspect around a box that is stretched so, with few ticks."""
     axes.set_xlim(box[:, 0])
     axes.set_ylim(box[:, 1])
-    axes.set_aspect("equal", anchor="NW")
+    axes.set_aspect(stretch[1] / stretch[0], anchor="NW")
     for axis, name, room, ticks in zip((axes.xaxis, axes.yaxis), "xy", _size_of(axes), (5.0, 2.5)):
         axis.set_major_locator(MaxNLocator(int(np.clip(room / (ticks * em()), 1, 6)), steps=[1, 2, 5, 10]))
         axis.set_label_text(f"{name} ({units['length']})")
@@ -249,11 +282,20 @@ def draw_outline(axes, points, results, **style):
     axes.add_collection(LineCollection(results.outline(points), capstyle="round", **style))
 
 
+class Strokes(withTickedStroke):
+    """Strokes along a line; none along a line that is shorter than their distance, for which matplotlib fails."""
+
+    def draw_path(self, renderer, gc, path, affine, face=None):
+        points = affine.transform(path.vertices)
+        if np.linalg.norm(np.diff(points, axis=0), axis=1).sum() > renderer.points_to_pixels(self._spacing):
+            super().draw_path(renderer, gc, path, affine, face)
+
+
 def draw_foundation(axes, results, factor=1.0):
     """The obstacle as a thick line, hatched on its far side, for displacements amplified by `factor`."""
     for line in results.foundation(factor):
         # The body is on the left of the line, so the strokes go to the right.
-        strokes = withTickedStroke(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
+        strokes = Strokes(spacing=6, angle=-135, length=1.0, linewidth=0.8, foreground=INK)
         axes.plot(*line.T, color=INK, linewidth=0.8, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=INK, linewidth=1.8, zorder=1.6, solid_capstyle="butt")
 
@@ -286,9 +328,13 @@ def stress_unit(largest, units):
 
 
 def mesh_of(results, points):
-    """The flat pieces of the shown elements, for these positions of the nodes."""
-    hidden = np.repeat(~results.shown, results.pieces.cuts**2)
-    return Triangulation(*results.pieces.at_points(points).T, results.pieces.triangles, hidden)
+    """The flat pieces of the shown elements, for these positions of the nodes, material by material: a triangle covers
+    half a pixel of those before it, so that others would leave specks along interfaces."""
+    hidden, triangles = np.repeat(~results.shown, results.pieces.cuts**2), results.pieces.triangles
+    if results.materials is not None:
+        order = np.repeat(results.materials, results.pieces.cuts**2).argsort(kind="stable")
+        hidden, triangles = hidden[order], triangles[order]
+    return Triangulation(*results.pieces.at_points(points).T, triangles, hidden)
 
 
 def stress_colours(results, top):
@@ -376,10 +422,12 @@ def least_zeta(low):
 
 
 def along(points, units):
-    """A coordinate along a path: x or y if the path follows this axis, otherwise arc length."""
+    """A coordinate along a path: x or y if the path follows this axis, otherwise arc length between its named ends."""
     unit = units["length"]
     for k, (name, other) in enumerate(("xy", "yx")):
         if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):
             return points[:, k], f"{name} ({unit}) along {other} = {points[0, 1 - k]:g}"
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength ({unit})"
+    first, last = (f"({x:.4g}, {y:.4g})" for x, y in points[[0, -1]])
+    way = f"once round from {first}" if first == last else f"{first} → {last}"
+    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength ({unit}), {way}"

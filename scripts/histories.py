@@ -120,7 +120,7 @@ def draw_histories(results):
     history = results.history
     if len(history.get("time", [])) < 3:
         return None
-    figures = [(of, history[name]) for name, of in results.summary.get("figures", {}).items()
+    figures = [(of, history[name]) for name, of in results.figures.items()
                if "." not in name and name in history and np.nanmax(np.abs(history[name]), initial=0.0) > 0.0]
     powers = [power_of(np.nanmax(np.abs(values))) for _, values in figures]
     left, right, top, bottom = (em() * of for of in AROUND_PLOTS)

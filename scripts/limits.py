@@ -7,6 +7,9 @@ import numpy as np
 from results import amplification
 from setting import largest_load, near
 
+# A singular pressure is a peak within this part of its boundary; pressures below this part of it are no contact.
+PEAK, LEAST_REST = 0.02, 1e-3
+
 
 @dataclass
 class Limits:
@@ -44,14 +47,27 @@ def stress_top(state, stress):
 
 
 def _pressure_top(state):
-    """The largest contact pressure; at a peak of a corner, the pressure that is exceeded on 1 % of Γ_C."""
+    """The largest contact pressure. Near a singular one and the ends of its boundary, and at another peak of a corner, it is the
+    largest beside them."""
     curves = [curve for curve in state.curves if len(curve.points) > 1]
     if not curves:
         return state.pressure.max()
-    lengths = [np.linalg.norm(np.gradient(of.points, axis=0), axis=1) for of in curves]
+    lengths = np.concatenate([np.linalg.norm(np.gradient(of.points, axis=0), axis=1) for of in curves])
     pressure = np.concatenate([curve.pressure for curve in curves])
-    largest, top = pressure.max(), _exceeded_in(0.01, pressure, np.concatenate(lengths))
+    regular = np.concatenate([curve.pressure * ~is_near_peak(state.peak_of(curve), curve.points) for curve in curves])
+    # Without other pressures the peak is the contact.
+    regular = regular if regular.max() > LEAST_REST * pressure.max() else pressure
+    largest, top = regular.max(), _exceeded_in(0.01, regular, lengths)
     return top if largest > 4.0 * top > 0.0 else largest
+
+
+def is_near_peak(figure, points):
+    """Per node of a contact boundary: is it near a singular pressure, which this figure is, or near the ends?"""
+    if not figure.get("singular"):
+        return np.full(len(points), False)
+    peaks = np.array([points[0], points[-1], figure["at"] or points[0]])
+    distances = np.linalg.norm(points[:, None] - peaks, axis=2).min(axis=1)
+    return distances <= PEAK * np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
 
 
 def limits_of(states, factor=None):

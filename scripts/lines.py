@@ -2,16 +2,19 @@
 
 import os
 import sys
+from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 import signorini_results
 from drawing import INK, colours, em, legend, plot, room_for_legend, wrapped
+from limits import is_near_peak
 from reading import open_run
 from results import ResultError, write_table
 from signorini_files import whole
 from signorini_summaries import settings_of, units_of, varied
+from table import names_of
 
 UNITS = {"zeta": "", "u_x": "length", "u_y": "length", "gap": "length", **dict.fromkeys(signorini_results.STRAINS, "")}
 
@@ -24,21 +27,26 @@ def draw_curves(arguments):
     folder, units = runs[0].folder, units_of(runs[0].summary)
     for quantity in arguments.quantity or ["von_mises"]:
         curves, rows = [], []
-        for run, name in zip(runs, names_of(runs)):
+        for run, name in zip(runs, run_names(runs)):
+            boundaries = boundaries_of(run, arguments.along)
             frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
             if missing := [f"{time:g}" for time in arguments.times or [] if not np.isclose(time, list(frames)).any()]:
                 print(f"{run.folder}: no frame at t = {', '.join(missing)}: the nearest are drawn", file=sys.stderr)
-            for frame in frames.values():
-                places, values = _values(frame, arguments, quantity)
-                label = f"t = {frame.time:g} {units['time']}"
-                curves.append((label if len(runs) == 1 else f"{name}, {label}", places, values))
-                rows += [{"run": run.folder.name, "time": frame.time, "s": s, quantity: value}
-                         for s, value in zip(places, values) if np.isfinite(s)]
+            for frame, boundary in product(frames.values(), boundaries):
+                places, values = _values(frame, arguments, boundary, quantity)
+                at = coordinate_of(run, boundaries)
+                places = places if at is None else _along_axis(run.parts(boundary), at)
+                parts = (name * (len(runs) > 1), (boundary or "") * (len(boundaries) > 1), f"t = {frame.time:g} {units['time']}")
+                peak = run.summary.get("figures", {}).get(f"{boundary}.pressure_max") if quantity == "normal_pressure" else None
+                peak = {**(peak or {}), **({} if frame.time == run.frames[-1][0] else {"bar": None})}
+                curves.append((", ".join(filter(None, parts)), places, values, peak, boundary and np.vstack(run.parts(boundary))))
+                rows += [{"run": run.folder.name, **({"boundary": boundary} if len(boundaries) > 1 else {}), "time": frame.time,
+                          "s": s, quantity: value} for s, value in zip(places, values) if np.isfinite(s)]
         path = folder / f"curves_{where}_{quantity}.csv"
         with whole(path) as part:
             write_table(rows, part)
         yield path
-        figure = _draw(curves, f"distance along {_way(runs[0], arguments)} ({units['length']})", quantity, units)
+        figure = _draw(curves, f"{_way(runs[0], arguments)} ({units['length']})", quantity, units)
         for ending in arguments.format:
             path = folder / f"curves_{where}_{quantity}.{ending}"
             with whole(path) as part:
@@ -48,11 +56,22 @@ def draw_curves(arguments):
 
 
 def _draw(curves, abscissa, quantity, units):
-    """A plot of curves: their labels, places and values."""
-    below = room_for_legend([label for label, *_ in curves])
+    """A plot of curves: their labels, places and values; and for the contact pressure the figure of the largest one,
+    whose bar is a band, or which is clipped if it is singular, and the points of the boundary."""
+    labels = [label + (", clipped: singular" if peak.get("singular") else ", with the bar of the largest" * bool(peak.get("bar")))
+              for label, _, _, peak, _ in curves]
+    below, tops = room_for_legend(labels), []
     figure, axes = plot(below=below)
-    for (label, places, values), colour in zip(curves, colours(len(curves))):
+    for label, (_, places, values, peak, points), colour in zip(labels, curves, colours(len(curves))):
         axes.plot(places, values, label=label, linewidth=1.3, color=colour)
+        if bar := peak.get("bar"):
+            axes.fill_between(places, np.maximum(values - bar, 0.0), values + bar, where=values > 0.0, color=colour,
+                              alpha=0.25, linewidth=0)
+        known = values[np.isfinite(places)]
+        regular = known[~is_near_peak(peak, points)] if peak.get("singular") and len(points) == len(known) else known
+        tops.append(np.nanmax(regular) + (bar or 0.0) if np.isfinite(regular).any() else 0.0)
+    if any(peak.get("singular") for *_, peak, _ in curves) and max(tops) > 0.0:
+        axes.set_ylim(0.0, 1.08 * max(tops))
     unit = units.get(UNITS.get(quantity, "stress"), "")
     words = quantity.replace("_", " ").replace("mises", "Mises stress")
     axes.set_ylabel(f"{words} ({unit})" if unit else words)
@@ -67,13 +86,36 @@ def _way(run, arguments):
     """The line or the boundary with the coordinates of its ends."""
     if arguments.line:
         x0, y0, x1, y1 = arguments.line
-        return f"({x0:g}, {y0:g}) → ({x1:g}, {y1:g})"
+        return f"distance along ({x0:g}, {y0:g}) → ({x1:g}, {y1:g})"
+    boundaries = boundaries_of(run, arguments.along)
+    if (at := coordinate_of(run, boundaries)) is not None:
+        return "xy"[at]
+    if len(boundaries) > 1:
+        return "distance along each boundary"
     parts = run.parts(arguments.along)
     ends = [" → ".join(f"({x:.4g}, {y:.4g})" for x, y in part[[0, -1]]) for part in parts]
-    return f"{arguments.along}: {', '.join(ends[:3])}{' …' * (len(ends) > 3)}"
+    return f"distance along {arguments.along}: {', '.join(ends[:3])}{' …' * (len(ends) > 3)}"
 
 
-def names_of(runs):
+def boundaries_of(run, text):
+    """The boundaries that a text names: one, or several with commas as in CSV; [None] without a text."""
+    return [text] if text is None or text in run.summary["boundaries"] else names_of(text)
+
+
+def coordinate_of(run, boundaries):
+    """0 or 1 if several boundaries are straight along x or y; None for others."""
+    if len(boundaries) < 2:
+        return None
+    extents = np.array([np.ptp(np.vstack(run.parts(name)), axis=0) for name in boundaries])
+    return next((k for k in (0, 1) if (extents[:, 1 - k] <= 1e-9 * extents[:, k]).all()), None)
+
+
+def _along_axis(parts, k):
+    """The coordinates of the points of a boundary, NaN between its parts."""
+    return np.concatenate([np.append(part[:, k], np.nan) for part in parts])[:-1]
+
+
+def run_names(runs):
     """Names of runs for a legend: the values in which they differ, if their folders are called after these, else the folders."""
     settings, folders = settings_of([run.summary for run in runs]), [run.folder.name for run in runs]
     keys = varied(settings)
@@ -94,11 +136,11 @@ def differences(names):
     return [f" {name}" if name.startswith("_") else name for name in found]
 
 
-def _values(frame, arguments, quantity):
+def _values(frame, arguments, boundary, quantity):
     """The places along the line or the boundary, and the values there."""
     def along(name):
-        if arguments.along:
-            return frame.along(arguments.along, name)
+        if boundary:
+            return frame.along(boundary, name)
         x0, y0, x1, y1 = arguments.line
         return frame.line((x0, y0), (x1, y1), name)
 

@@ -37,6 +37,15 @@ def draw_stress_and_damage(results, limits, figure=None):
     return draw_maps(maps, headline(results, _with_circle(results, results.part)), results.units, figure)
 
 
+def draw_times(chosen, limits, figure=None):
+    """The damage, or the stress without damage, at several times, a map each, in common colours."""
+    coloured = damage_map if limits.is_damaged else von_mises_map
+    maps = [coloured(results, limits) for results in chosen]
+    for of, results in zip(maps, chosen):
+        of.title = f"{results.moment}: {of.title}"
+    return draw_maps(maps, headline(chosen[-1], f"{len(maps)} states"), chosen[-1].units, figure)
+
+
 def draw_everything(results, limits, figure=None):
     """The maps of all other pictures in one."""
     maps = [deformed_map(results, limits), von_mises_map(results, limits), *(principal_maps(results) or ())]
@@ -62,10 +71,7 @@ def draw_state(results, limits, figure=None):
 
 
 def deformed_map(results, limits):
-    """The deformed mesh, the initial outline and the foundation.
-
-    The obstacle is drawn opposite the nodes of Γ_C. Where displacements are amplified it seems to slide with them.
-    """
+    """The deformed mesh, the initial outline and the foundation; see `Results.foundation`."""
     moved = results.places(limits.factor)
 
     def paint(axes):

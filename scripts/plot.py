@@ -19,7 +19,7 @@ With --figure: figures of a study over the value that it varies, with their bars
 
     signorini plot out/lshape-study --figure zeta_min,foundation.force_y
 
-On request: mesh; contact-evolution, the pressure on Γ_C in time; damage (without damage: stress) and
+On request: mesh; contact-evolution, the pressure on Γ_C in time; times, maps of several times; damage (without damage: stress) and
 pressure as animations.
 """
 
@@ -32,15 +32,16 @@ from math import inf, isfinite
 
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
+from drawing import OPTIONS
 from animation import animate
 from contact_pressure import draw_evolution, draw_pressure, draw_pressures
 from histories import draw_damage_history, draw_force_displacement, draw_forces
 from limits import box_of, limits_of
-from lines import draw_curves, names_of as names_of_runs
-from maps import draw_deformed, draw_mesh, draw_stress_and_damage
+from lines import draw_curves, run_names
+from maps import draw_deformed, draw_mesh, draw_stress_and_damage, draw_times
 from paraview_script import write_script
 from principal import draw_principal
-from reading import evenly, read_results, read_without_fields, states
+from reading import evenly, nearest, read_results, read_without_fields, states
 from results import ResultError, telling
 from setting import draw_setting
 from signorini_files import check, whole
@@ -62,6 +63,8 @@ PICTURES = {
 TOGETHER = {"pressure": draw_pressures, "force-displacement": draw_forces}
 # Pictures of the whole run, for all times.
 OF_ALL_TIMES = ("damage-history", "force-displacement")
+# Pictures of maps, which --zoom changes.
+OF_MAPS = ("deformed", "stress-damage", "principal-stresses", "mesh", "times")
 # The file formats of pictures.
 FORMATS = ("png", "svg", "pdf")
 # The largest number of frames in the contact evolution.
@@ -82,12 +85,14 @@ def arguments_of(prog):
         "FORMAT"), help="png, svg, pdf, or several with commas (default: png)")
     parser.add_argument("--line", type=numbers(4), metavar="X0,Y0,X1,Y1", help=(
         "only curves of fields along this line"))
-    parser.add_argument("--along", metavar="BOUNDARY", help="only curves of fields along a boundary")
+    parser.add_argument("--along", metavar="BOUNDARY,…", help=(
+        "only curves of fields along a boundary, or several in one picture; a name with a comma stands in double quotes"))
     parser.add_argument("--quantity", type=lambda text: text.split(","), metavar="NAME,…", help=(
         "fields of --line and --along: zeta, u_x, u_y, stress_xx, stress_yy, stress_xy, stress_zz, stress_1, "
         "stress_2, strain_xx, strain_yy, strain_xy, von_mises, normal_pressure, gap (default: von_mises)"))
     parser.add_argument("--times", type=numbers(None), metavar="T,…", help=(
-        "times of the curves, s (default: the last frame)"))
+        "times of the curves, s (default: the last frame); without curves: only times, maps at these times"))
+    parser.add_argument("--zoom", type=numbers(4), metavar="X0,Y0,X1,Y1", help="the part of the body that maps show")
     parser.add_argument("--no-title", action="store_true", help="without titles, for papers")
     parser.add_argument("--width", type=float, metavar="INCHES", help="the width of every picture")
     parser.add_argument("--only", type=lambda text: text.split(","), default=list(PICTURES), metavar="NAME,…", help=(
@@ -120,8 +125,13 @@ def arguments_of(prog):
         parser.error(f"--only: {', '.join(sorted(unknown))} is none of {', '.join(PICTURES)}")
     if arguments.line and arguments.along:
         parser.error("--line and --along: give one of them")
-    if (arguments.times or arguments.quantity) and not (arguments.line or arguments.along):
-        parser.error("--times and --quantity are for curves: give --line or --along, too; --time is for pictures")
+    if arguments.quantity and not (arguments.line or arguments.along):
+        parser.error("--quantity is for curves: give --line or --along, too")
+    if arguments.zoom:
+        x0, y0, x1, y1 = arguments.zoom
+        if not (-inf < x0 < x1 < inf and -inf < y0 < y1 < inf):
+            parser.error("--zoom: needs X0 < X1 and Y0 < Y1")
+        arguments.zoom = [[x0, y0], [x1, y1]]
     for name, most in (("factor", inf), ("width", 100.0)):
         if getattr(arguments, name) is not None and not 0.0 < getattr(arguments, name) < most:
             parser.error(f"--{name}: must be positive" + (f", below {most:g} inches" if most < inf else ""))
@@ -153,7 +163,7 @@ def tell(path):
 
 def save(figure, results, name, formats):
     """Saves a figure and closes it. Without a figure, removes the picture of an earlier run."""
-    moment = "" if results.is_last else f"_t{results.time:g}"
+    moment = ("" if results.is_last else f"_t{results.time:g}") + ("_zoom" if OPTIONS.zoom and name in OF_MAPS else "")
     if figure is None:
         for path in (results.folder / f"{name}{moment}.{ending}" for ending in FORMATS):
             check(path)
@@ -175,6 +185,11 @@ def draw(results, limits, arguments):
         tell(write_script(results, limits_of(chosen, arguments.factor)))
         return
     last = replace(results, time=results.frames[-1][0])
+    if arguments.times:
+        chosen = states(results, [results.frames[k] for k in dict.fromkeys(
+            nearest(results.frames, time) for time in arguments.times)])
+        save(draw_times(chosen, limits_of(chosen, arguments.factor)), last, "times", arguments.format)
+        return
     for name in arguments.only:
         save(PICTURES[name](results, limits), last if name in OF_ALL_TIMES else results, name, arguments.format)
     if arguments.mesh:
@@ -195,7 +210,7 @@ def draw_together(runs, arguments):
         raise ResultError(f"--together draws {' and '.join(TOGETHER)}; name one of them after --only")
     if len({tuple(run.units.items()) for run in runs}) > 1:
         raise ResultError("the runs have different units; draw those with the same units together")
-    names, found = names_of_runs(runs), []
+    names, found = run_names(runs), []
     for name in chosen:
         figure = TOGETHER[name](runs, names)
         found += [name] * (figure is not None)
@@ -208,7 +223,7 @@ def main(prog=None):
     """Returns the exit code: 2 if a picture could not be drawn. A message names it."""
     arguments = arguments_of(prog)
     drawing.use(width=arguments.width, titles=not arguments.no_title, contours=arguments.contours,
-                abscissa=arguments.abscissa, range=arguments.range)
+                abscissa=arguments.abscissa, range=arguments.range, zoom=arguments.zoom)
     if arguments.animate:
         try:
             check_movie(arguments.animate)

@@ -22,6 +22,7 @@ from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
+import numpy as np
 from drawing import FAINT, RED, plt, wrapped
 from bars import barred, plain
 from contact_pressure import draw_evolution
@@ -31,7 +32,7 @@ from limits import limits_of
 from maps import draw_everything
 from reading import evenly, read_results
 from report_pdf import FULL, LINE, SIZE, SPACE, pages_of
-from results import telling
+from results import ROUNDING, telling
 from signorini_files import check, whole
 from signorini_summaries import flag_of, folders_of
 from table import text_of
@@ -42,8 +43,9 @@ EVOLUTION = 50
 # The scripts of the viewer, in the order in which they need each other, and the pictures in the place of which it stands.
 SCRIPTS = "data.js", "locator.js", "body.js", "overlay.js", "charts.js", "viewer.js"
 IN_VIEWER = "deformed", "stress-damage", "principal-stresses"
-# The least height, inches, for the maps of the PDF on a page with other blocks.
-LEAST_MAPS = 3.0
+# The least height, inches, for the maps of the PDF on a page with other blocks: of their labels, and over that of a body that is as
+# wide as the page; and the largest such height. The largest height of the setting and of the pressure there.
+LEAST_LABELS, LEAST_BODY, LEAST_MAPS, LOW = 1.2, 2.8, 3.0, 2.2
 # The limits of the model, for the head of the report.
 MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
 # What the processes draw, by name.
@@ -153,38 +155,60 @@ def said(figure, value, flagged=True):
     the mesh does not determine it. The reason may not hold at another place and time."""
     if value is None:
         return "–"
+    if value == 0.0 and figure["bar"] is None:
+        return "0"
     flag, _ = flag_of(figure)
     if flag and flagged:
         return f"{plain(value, 2)}, {flag}"
     return value == figure["value"] and barred(value, figure["bar"]) or f"{float(f'{value:.4g}'):g}"
 
 
+def reason(results, name, figure):
+    """Why the mesh does not determine a figure, in plain words, with the distance at which to read a stress that is infinite
+    at a point."""
+    flag, why = flag_of(figure)
+    if flag == "singular":
+        away = f"; see {_away(results)}" if f"{name}_away" in results.figures else ""
+        return f"infinite at {why}{away}"
+    return f"the mesh is too coarse: {why}" if flag and not why.startswith("it ") else why
+
+
+def _away(results):
+    """The distance from singular points of the figures `…_away`, in words."""
+    away = results.scene.get("away")
+    return f"{away:g} {results.units['length']} away" if isinstance(away, (int, float)) else "away from singular points"
+
+
 def governing(results):
     """Of each figure of the whole body: its name, its extreme over all steps, the unit, the time and the place, the value
-    of the last state if it is another one, and why the mesh does not determine it; below a head."""
+    of the last state if it is another one, and why the mesh does not determine it; below a head. A stress away from
+    singular points stands below that of the whole body."""
     rows, is_stopped = [], results.summary.get("stopped_by") == "damage"
-    for name, figure in results.summary.get("figures", {}).items():
+    figures = {name: of for name, of in results.figures.items() if "." not in name and of["governing"]}
+    order = [name for base in figures for name in (base, f"{base}_away") if name in figures]
+    for name in dict.fromkeys(order):
+        figure = figures[name]
         extreme = figure["governing"]
-        if "." in name or extreme is None:
-            continue
         flagged, place = is_flagged(figure, extreme), extreme["at"]
         text, last = said(figure, extreme["value"], flagged), said(figure, figure["value"])
         time = f"{extreme['time']:g}"
         if name == "zeta_min" and is_stopped:
             text, time = "reached ζ_*", results.stopping_time
-        rows.append((figure["label"], text, figure["unit"], time, f"({place[0]:.4g}, {place[1]:.4g})" if place else "",
-                     last * (last != text), flag_of(figure)[1] if flagged else ""))
+        label = figure["label"].replace(" away from singular points", f", {_away(results)}")
+        rows.append((label, text, figure["unit"], time, f"({place[0]:.4g}, {place[1]:.4g})" if place else "",
+                     last * (last != text), reason(results, name, figure) if flagged else ""))
     before = ", before the stop" if results.summary.get("stopped_by") else ""
     head = ("", "over all steps", "", f"at t ({results.units['time']})", f"at ({results.units['length']})",
             f"last state{before}", "why not determined")
-    shown = [k for k in range(len(head)) if k == 0 or any(row[k] for row in rows)]
+    # A static solve has no other time.
+    shown = [k for k in range(len(head)) if k == 0 or any(row[k] for row in rows) and (k != 3 or len(results.frames) > 1)]
     return [[row[k] for k in shown] for row in rows], [head[k] for k in shown]
 
 
 def by_name(results, with_places=True):
     """Tables of the figures of supports, probes and materials: a row for each name, and two where the extreme of the run
     is not the value of the last state; a column for each figure, or for both components. Places have no extremes."""
-    figures, names, alike = results.summary.get("figures", {}), {}, {}
+    figures, names, alike = results.figures, {}, {}
     for key, of in figures.items():
         name, point, kind = key.rpartition(".")
         if point and (with_places or of["governing"]):
@@ -206,7 +230,7 @@ def by_name(results, with_places=True):
             times = [", ".join(dict.fromkeys(f"{extreme['time']:g}" for _, extreme in cell)) for cell in extremes]
             shown = [f"{text} at t = {time}" * (text not in ("", value))
                      for text, time, value in zip(most, times, last)]
-            rows += [[name, *last]] + [["   extreme", *shown]] * any(shown)
+            rows += [[results.surface(name), *last]] + [["   extreme", *shown]] * any(shown)
         yield rows, ["", *(text.replace(" ()", "") for text in head)]
 
 
@@ -223,8 +247,7 @@ def body(results):
     material = scene.get("material", {})
     rows = [("dimensions", f"{high[0] - low[0]:.4g} × {high[1] - low[1]:.4g} {units['length']}"),
             ("plane", str(material.get("plane", "")))]
-    surfaces = [name for name, of in material.items() if isinstance(of, dict)]
-    return rows + [(name, results.elasticity(name)) for name in ("material", *surfaces)]
+    return rows + [(results.surface(name), results.elasticity(name)) for name in results.materials_there]
 
 
 def run_of(summary):
@@ -265,7 +288,7 @@ def errors_of(summary):
     # A bound below 100 % takes the place of the estimate.
     errors.pop("displacement_mesh" if errors.get("displacement_bound", 1) < 1 else "displacement_bound", None)
     return [(ERRORS.get(key, key), "unknown: as large as the solution, or larger" if value > 1.0 else
-             f"{100 * value:.2g} %") for key, value in errors.items()]
+             f"{100 * value:.2g} %" if value > ROUNDING else f"below {plain(100 * ROUNDING)} %") for key, value in errors.items()]
 
 
 def page(results, arguments, everything):
@@ -307,7 +330,8 @@ def page(results, arguments, everything):
 
 
 def write_pdf(path, results, arguments, everything):
-    """Writes two pages: the setting, the governing values and curves; maps. What only its author needs is at the end."""
+    """Writes the setting, the governing values and curves, and maps, on one page if there is room. What only its author needs is
+    at the end."""
     title, byline, subtitle, ending = head_of(results, arguments)
     draw, summary = pictures(results, everything), results.summary
     with pages_of(path) as pages:
@@ -316,7 +340,7 @@ def write_pdf(path, results, arguments, everything):
         pages.text(ending, color=RED, weight="bold")
         errors = errors_of(summary)
         pages.table("Body, materials, and estimated relative errors", body(results) + [("", "")] * bool(errors) + errors)
-        drawing.use(size=SIZE, width=pages.beside if pages.beside > 2.5 else FULL, height=2.6)
+        drawing.use(size=SIZE, width=pages.beside if pages.beside > 2.5 else FULL, height=LOW)
         draw["setting"](figure=pages)
         pages.new_line()
         pages.table("Governing values", *governing(results))
@@ -334,7 +358,8 @@ def write_pdf(path, results, arguments, everything):
         draw["damage-history"](figure=pages)
         drawing.use(width=third if len(results.curves) < 2 else FULL)
         draw["pressure"](figure=pages)
-        if pages.number == 1 or pages.left < LEAST_MAPS:
+        width, height = np.ptp(results.nodes, axis=0)
+        if pages.left < min(LEAST_MAPS, LEAST_LABELS + LEAST_BODY * height / width):
             pages.next()
         pages.new_line()
         made = " · ".join(f"{name} {value}" for name, value in run_of(summary) + provenance(summary)[:-1])

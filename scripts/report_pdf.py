@@ -2,6 +2,7 @@
 
 from contextlib import contextmanager
 
+import numpy as np
 from matplotlib.backends.backend_pdf import PdfPages
 
 import drawing
@@ -16,6 +17,8 @@ FULL = WIDTH - 2 * MARGIN
 SIZE, LINE = 8, 0.155
 # Tables that are wider than a page by up to this factor have smaller letters.
 WIDEST = 1.3
+# The least width of a last column of sentences, which is narrower in a wide table, inches.
+SENTENCES = 1.8
 
 
 class Pages:
@@ -77,13 +80,14 @@ class Pages:
 
     def table(self, title, rows, head=()):
         """A block with a title and rows of cells, below a head if there is one. Columns are as wide as their widest
-        cells. If the table is too wide, its letters are smaller, or columns stand below the others, with the first
-        column again."""
+        cells. In a table that is too wide, sentences of the last column have several lines; then letters are smaller, or
+        columns stand below the others, with the first column again."""
         cells = [[text_of(cell) for cell in row] for row in rows]
         columns = [list(column) for column in zip(*cells)]
         widths = [max(width_of(cell, SIZE) for cell in column) + 0.15 for column in columns]
         if head:
             widths = [max(width, min(width_of(name, SIZE) + 0.15, 1.0)) for width, name in zip(widths, head)]
+        widths[-1] = max(min(widths[-1], SENTENCES), widths[-1] - max(0.0, sum(widths) - FULL))
         size = FULL / sum(widths) if FULL < sum(widths) <= WIDEST * FULL else 1.0
         while columns:
             count = len(columns)
@@ -95,14 +99,19 @@ class Pages:
 
     def _part(self, title, columns, widths, head, size):
         heads, line = [wrapped(name, width - 0.1, SIZE) for name, width in zip(head, widths)], size * LINE
+        cells = [[[cell] for cell in column] for column in columns]
+        cells[-1] = [wrapped(cell, widths[-1] - 0.1, SIZE) for cell in columns[-1]]
+        # The first line of each row.
+        lines = np.cumsum([0] + [max(1, *map(len, row)) for row in zip(*cells)])
         first, above = 1.4 * LINE * bool(title), line * max(map(len, heads), default=0)
-        _, x, y = self.place(max(size * sum(widths), width_of(title, SIZE) * 1.4), first + above + len(columns[0]) * line)
+        _, x, y = self.place(max(size * sum(widths), width_of(title, SIZE) * 1.4), first + above + lines[-1] * line)
         self.write(x, y, title, size=1.2 * SIZE, weight="bold", color=INK)
-        for k, (column, width) in enumerate(zip(columns, widths)):
+        for k, (column, width) in enumerate(zip(cells, widths)):
             for number, text in enumerate(heads[k] if heads else ()):
                 self.write(x, y + first + number * line, text, size * SIZE, color="#66707a")
-            for number, cell in enumerate(column):
-                self.write(x, y + first + above + number * line, cell, size * SIZE)
+            for start, cell in zip(lines, column):
+                for number, text in enumerate(cell, start):
+                    self.write(x, y + first + above + number * line, text, size * SIZE)
             x += size * width
 
 

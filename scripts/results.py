@@ -1,14 +1,16 @@
 """A state of a run and its geometry, for pictures."""
 
 import csv
+import re
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from bars import barred, plain
+from bars import LEAST_BAR, barred, plain
 from elements import Pieces
 from signorini_results import paths
 from signorini_summaries import flag_of, option_of, units_of
@@ -18,6 +20,11 @@ from table import write_table  # noqa: F401
 ROUNDING = 1e-9
 # ζ closer to 1 than this is undamaged.
 UNDAMAGED = 1e-12
+# Angles, radians, below which an obstacle is flat.
+FLAT = 1e-6
+# The name of a surface, in a geometry or among the $PhysicalNames of a mesh, which stand in its first bytes.
+SURFACE = re.compile(r'Physical\s+Surface\s*\(\s*"([^"]+)"|^2 \d+ "([^"]+)"', re.MULTILINE)
+FIRST_BYTES = 1 << 16
 
 
 def read_table(path, texts=()):
@@ -159,11 +166,38 @@ class Results:
         tables = [self.scene.get(table, {}) for table in ("material", "damage")]
         return ["material", *sorted({name for table in tables for name, of in table.items() if isinstance(of, dict)})]
 
+    @property
+    def materials_there(self):
+        """The names of the materials that the body has."""
+        return ["material"] if self.materials is None else [self.material_names[k] for k in np.unique(self.materials)]
+
+    def surface(self, material):
+        """The name of a material in texts. The rest of the body has the name of its surface, if it is a single one."""
+        others = set(surfaces_of(self.folder)) - set(self.material_names)
+        return others.pop() if material == "material" and len(others) == 1 else material
+
+    @property
+    def figures(self):
+        """The figures of the summary, zeros in place of rounding errors: without ζ if the scene has no damage, and with the
+        sum of the contact reactions if there are several foundations."""
+        figures = self.summary.get("figures", {})
+        left_out = ["contact_force"] if sum(name.endswith(".contact_length") for name in figures) < 2 else []
+        scales = {}
+        for of in figures.values():
+            scales[of["unit"]] = max(scales.get(of["unit"], 0.0), abs(of["value"] or 0.0))
+        # A moment has the size of a force at the other end of the body.
+        moment, force = self.units["force"], self.units["line"]
+        scales[moment] = max(scales.get(moment, 0.0), scales.get(force, 0.0) * self.size)
+        is_damaged = not self.scene or "damage" in self.scene
+        return {name: _without_roundoff(of, scales[of["unit"]]) for name, of in figures.items() if name not in left_out
+                and (is_damaged or not name.rpartition(".")[2].startswith("zeta"))}
+
     def elasticity(self, name="material"):
         """The elastic constants of a material, in words."""
         general = self.scene.get("material", {})
         of = {**general, **general.get(name, {})}
-        words = [f"E = {of['young']:g} {self.units['stress']}", f"ν = {of['poisson']:g}"] if "young" in of else []
+        young = f"{of['young']:g}".replace("e+", "e").replace("e0", "e") if "young" in of else ""
+        words = [f"E = {young} {self.units['stress']}", f"ν = {of['poisson']:g}"] if young else []
         return ", ".join(words + ([f"ρ = {of['density']:g}"] if of.get("density") else []))
 
     @property
@@ -207,6 +241,10 @@ class Results:
         """What makes an extreme stress of the last state singular; None if nothing does, and at other times."""
         largest = self.summary.get("figures", {}).get(name) or {}
         return largest.get("singular") if self.is_last else None
+
+    def peak_of(self, curve):
+        """The figure of the largest pressure of the last state on the boundary of a curve; empty without one."""
+        return self.summary.get("figures", {}).get(f"{curve.name}.pressure_max", {})
 
     @property
     def step(self):
@@ -266,13 +304,47 @@ class Results:
         """The obstacle as polylines, for displacements amplified by `factor`.
 
         To scale, the point opposite a node x of Γ_C is x + g ν. A node touches the obstacle if u·ν = g. So that it also
-        does so amplified, the distance is amplified, and the point follows the sliding of the body, as far as this is
-        amplified: x + factor g ν + (factor − 1) (u·τ) τ.
+        does so amplified, the distance is amplified: x + factor g ν. A flat obstacle with one gap is this line, which touches
+        the same nodes wherever they slide along it: it stays at its place, however the body moves. On another
+        obstacle a node that slides meets other points, so these follow its sliding, as far as this is amplified:
+        x + factor g ν + (factor − 1) (u·τ) τ.
         """
-        sliding = (self.displacement_at(self.contact) * self.tangents).sum(axis=2, keepdims=True) * self.tangents
-        lines = self.contact + factor * (self.obstacle - self.contact) + (factor - 1.0) * sliding
-        lines = np.round(lines, 12)
-        return [np.array(path) for path in paths([tuple(map(tuple, l)) for l in lines.tolist()])]
+        data = np.round(np.concatenate((self.contact, self.obstacle, self.tangents), axis=2), 12)
+        return [self._part(*np.hsplit(np.array(path), 3), factor)
+                for path in paths([tuple(map(tuple, edge)) for edge in data.tolist()])]
+
+    def _part(self, nodes, opposite, tangents, factor):
+        """A connected part of the amplified obstacle."""
+        displacement = self.displacement_at(nodes)
+        sliding = (factor - 1.0) * (displacement * tangents).sum(axis=1, keepdims=True) * tangents
+        line = nodes + factor * (opposite - nodes)
+        edges = np.diff(line, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        turns = [edges[:, 0] * tau[:, 1] - edges[:, 1] * tau[:, 0] for tau in (tangents[:-1], tangents[1:])]
+        if (np.abs(turns) > FLAT * lengths).any():
+            return np.round(line + sliding, 12)
+        # The body is on the left of the line from its first end, and on the right from the other.
+        still, data = line, (line, nodes, opposite - nodes - displacement, sliding)
+        for side, order in ((1, slice(None)), (-1, slice(None, None, -1))):
+            still = self._with_end(still[order], *(of[order] for of in data), side, factor)[order]
+        return np.round(still if len(still) > 1 else line + sliding, 12)
+
+    def _with_end(self, still, line, nodes, distance, sliding, side, factor):
+        """A flat obstacle with its first end at its place, if it can be there: it is shorter where the body beside it, which
+        has slid here, would be drawn behind the obstacle, and longer where touching nodes have slid beyond it."""
+        inwards = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
+        outwards = side * np.array([inwards[1], -inwards[0]])
+        visible, slid = 1e-3 * self.size, sliding[0] @ inwards
+        from_end = self.places(factor) - line[0]
+        is_behind = (from_end @ outwards > visible) & ((self.nodes - nodes[0]) @ outwards <= visible)
+        is_beside = (from_end @ inwards > 0.0) & (from_end @ inwards < slid)
+        touches = np.abs(distance @ outwards) <= ROUNDING * np.linalg.norm(self.displacement, axis=1).max()
+        reached = ((line + sliding - line[0]) @ inwards)[touches].min(initial=0.0)
+        end = slid if (is_behind & is_beside).any() else reached
+        if end == 0.0:
+            return still
+        beyond = still[(still - line[0]) @ inwards > end]
+        return np.vstack([line[0] + end * inwards, beyond]) if len(beyond) else beyond
 
 
 def amplification(size, largest):
@@ -296,6 +368,31 @@ def of_material(results):
         results, summary={**results.summary, "figures": own(results.summary.get("figures"))},
         zeta=np.where(inside, results.zeta, results.zeta[inside].max()), von_mises=results.von_mises * inside,
         principal=results.principal * inside[:, None])
+
+
+@cache
+def surfaces_of(folder):
+    """The names of the surfaces of the mesh, from the geometries and meshes in a folder of results. Names that a geometry
+    computes are missing."""
+    found = set()
+    for path in (*folder.glob("*.geo"), *folder.glob("*.msh")):
+        with open(path, encoding="utf-8", errors="replace") as file:
+            found |= {geometry or mesh for geometry, mesh in SURFACE.findall(file.read(FIRST_BYTES))}
+    return frozenset(found)
+
+
+def _without_roundoff(figure, scale):
+    """A figure, and its extreme over all steps, that are 0 if they are within a bar or a rounding error far below the
+    `scale` of other figures in its unit."""
+    bar = figure["bar"] or 0.0
+    noise = max(bar if bar <= LEAST_BAR * scale else 0.0, ROUNDING * scale)
+
+    def rounded(of):
+        value = of["value"]
+        return {**of, "value": 0.0} if value is not None and abs(value) <= noise else of
+
+    figure = {**rounded(figure), "governing": figure["governing"] and rounded(figure["governing"])}
+    return {**figure, "bar": None} if figure["value"] == 0.0 and (bar <= noise or scale == 0.0) else figure
 
 
 def without_roundoff(results):

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path
-from matplotlib.patheffects import withStroke, withTickedStroke
+from matplotlib.patheffects import withStroke
 from matplotlib.tri import Triangulation
 
 from drawing import (
-    BLUE, FAINT, GREEN, INK, LINE, OPTIONS, RED, Map, draw_foundation, draw_maps, draw_outline, em, headline, legend,
+    BLUE, FAINT, GREEN, INK, LINE, RED, Map, Strokes, draw_foundation, draw_maps, draw_outline, em, headline, inch_of, legend,
     room_for_legend, wide, width_of, wrapped,
 )
 from expressions import evaluate
@@ -24,8 +24,10 @@ ARROW, SPACING, ROLLERS = 0.12, 0.05, 0.03
 FAR = 0.25
 # Light colours of materials.
 MATERIALS = ("#edf1f5", "#f3e3c3", "#d5e8d4", "#e6d5ec", "#f7d4cd", "#cfe3f2")
-# The distance of names from their boundaries, inches.
-AWAY = 0.13
+# The distance of names from their boundaries, inches; how many places of a name are tried, and how often all names are placed.
+AWAY, TRIED, MOST = 0.13, 10, 12
+# The largest width of a line of a name, over that of the picture.
+WIDEST = 0.28
 
 
 def draw_setting(results, _limits, figure=None):
@@ -46,14 +48,20 @@ def draw_setting(results, _limits, figure=None):
                         near(_opposite(start, line), results.nodes)]) for (name, line), force in zip(curves, arrows)]
     entries, probes = _entries(results), results.scene.get("probe", [])
     below = room_for_legend([words for _, words in entries], always=True)
-    room = wide(7.2) - 8.0 * em(), OPTIONS.height - below - 5.0 * em()
     points = np.vstack([results.nodes, *outer])
+    drawn = np.vstack([points[:0], *outer, *(_samples(line, SPACING * size)[0] for _, line in curves)])
+    inch = 0.0
     # The length of an inch of the picture, m, follows from its box, and the box from the names.
-    for _ in range(3):
-        inch, names = (1.1 * np.ptp(points, axis=0) / room).max(), []
-        taken = [np.add(of["point"], inch * np.array([[0.0, 0.0], [width_of(of["name"]), 2.0 * em()]])) for of in probes]
-        for (name, line), beyond in zip(curves, outer):
-            names.append(_place_of_name(line, name, beyond, inch, taken))
+    for _ in range(MOST):
+        before, inch = inch, inch_of(np.array([points.min(axis=0), points.max(axis=0)]), below)
+        if abs(inch - before) < 1e-3 * inch:
+            break
+        names, taken = [], []
+        for name, line, beyond in [*((name, line, beyond) for (name, line), beyond in zip(curves, outer)),
+                                   *((of["name"], np.array(of["point"]), None) for of in probes)]:
+            at = _beside(line, name, inch) if beyond is None else _outwards(line, name, beyond, inch)
+            # The first of the best places.
+            names.append(min(at, key=lambda place: _covers(place[-1], taken, drawn)))
             taken.append(names[-1][-1])
         points = np.vstack([results.nodes, *outer, *taken])
 
@@ -70,11 +78,11 @@ def draw_setting(results, _limits, figure=None):
             condition = conditions.get(name, {})
             _draw_support(axes, line, condition, size)
             _draw_traction(axes, line, force, size)
-            axes.text(*place, name, color=_colour(condition), zorder=5, parse_math=False, **style)
-        for probe in probes:
+            axes.text(*place, _lines(name), color=_colour(condition), zorder=5, **style)
+        for probe, (place, style, _) in zip(probes, names[len(curves):]):
             axes.plot(*probe["point"], marker="+", color=INK, zorder=4)
-            axes.annotate(probe["name"], probe["point"], xytext=(4, 4), textcoords="offset points", fontsize="small",
-                          path_effects=[withStroke(linewidth=2.5, foreground="white")], zorder=4.5)
+            axes.text(*place, _lines(probe["name"]), fontsize="small", zorder=4.5,
+                      path_effects=[withStroke(linewidth=2.5, foreground="white")], **style)
         _draw_body_force(axes, results, time)
         for colour, words in entries:
             axes.plot([], [], color=colour, linewidth=4, label=words)
@@ -82,7 +90,7 @@ def draw_setting(results, _limits, figure=None):
 
     loads = f"; loads at {replace(results, time=time).moment}" if largest or "body" in results.scene else ""
     box = np.array([points.min(axis=0), points.max(axis=0)])
-    return draw_maps([Map("", box, paint, has_bar=False)], headline(results, f"setting{loads}"), units, figure, below)
+    return draw_maps([Map("", box, paint, has_bar=False, is_field=False)], headline(results, f"setting{loads}"), units, figure, below)
 
 
 def _entries(results):
@@ -94,7 +102,8 @@ def _entries(results):
              for (colour, words), names in alike.items()]
     if results.materials is not None:
         names = [(int(k), results.material_names[k]) for k in np.unique(results.materials)]
-        found += [(MATERIALS[k % len(MATERIALS)], f"{name}: {results.elasticity(name)}") for k, name in names]
+        found += [(MATERIALS[k % len(MATERIALS)], f"{results.surface(name)}: {results.elasticity(name)}")
+                  for k, name in names]
     kind, force = _body_force(results)
     unit = f"{results.units['length']}/s²" if kind == "gravity" else results.units["volume"]
     return found + ([(GREEN, f"{kind}: {_pair(force)} {unit}")] if force else [])
@@ -212,7 +221,7 @@ def _draw_support(axes, line, condition, size):
             axes.add_patch(Circle(point, radius, facecolor="white", edgecolor=BLUE, linewidth=0.9, zorder=1.8))
         axes.plot(*_outside(line, condition, size).T, color=BLUE, linewidth=1.2, zorder=1.8)
     elif "free" not in condition.get("displacement", ["free"]):
-        strokes = withTickedStroke(spacing=6, angle=-135, linewidth=0.9, foreground=BLUE)
+        strokes = Strokes(spacing=6, angle=-135, linewidth=0.9, foreground=BLUE)
         axes.plot(*line.T, color=BLUE, linewidth=0.9, path_effects=[strokes], zorder=1.5)
         axes.plot(*line.T, color=BLUE, linewidth=2.0, zorder=2.5, solid_capstyle="butt")
 
@@ -275,23 +284,42 @@ def near(points, body):
     return np.clip(points, low - FAR * max(high - low), high + FAR * max(high - low))
 
 
-def _place_of_name(line, name, others, inch, taken):
-    """The place of a boundary's name beside its middle, outside its arrows and the obstacle and off the boxes that are
-    `taken`; how it is aligned, and the corners of its box. An inch of the picture is `inch` metres."""
+def _outwards(line, name, others, inch):
+    """Places of a boundary's name beside its middle, outside its arrows and the obstacle, the nearest first: how the name is
+    aligned, and the corners of its box. An inch of the picture is `inch` metres."""
     points, normals = _samples(line, spacing=np.inf)
     x, y = normal = normals[1]
     beyond = max(0.0, ((others - points[1]) @ normal).max())
     style = {"ha": "center" if abs(x) < 0.4 else "left" if x > 0.0 else "right",
              "va": "center" if abs(y) < 0.4 else "bottom" if y > 0.0 else "top"}
-    size = np.array([width_of(f"{name} "), LINE * em()]) * inch
-    for away in AWAY * inch + size[1] * np.arange(10):
-        place = points[1] + (beyond + away) * normal
-        low = place - size * ({"left": 0.0, "center": 0.5, "right": 1.0}[style["ha"]],
-                              {"bottom": 0.0, "center": 0.5, "top": 1.0}[style["va"]])
-        box = np.array([low, low + size])
-        if not any((box[0] < of[1]).all() and (of[0] < box[1]).all() for of in taken):
-            break
-    return place, style, box
+    return [_aligned(points[1] + (beyond + inch * (AWAY + LINE * em() * k)) * normal, style, name, inch) for k in range(TRIED)]
+
+
+def _beside(point, name, inch):
+    """Places of the name of a probe in the four corners beside it, the nearest first."""
+    return [_aligned(point + (0.5 + k) * AWAY * inch * np.array([x, y]), {"ha": across, "va": upright}, name, inch)
+            for k in range(TRIED) for y, upright in ((1, "bottom"), (-1, "top")) for x, across in ((1, "left"), (-1, "right"))]
+
+
+def _lines(name):
+    """A name in lines."""
+    return "\n".join(wrapped(name, WIDEST * wide(7.2)))
+
+
+def _aligned(place, style, name, inch):
+    """A place of a name, its style, and the corners of its box."""
+    style = {**style, "parse_math": False, "linespacing": 1.1, "multialignment": style["ha"]}
+    lines = _lines(name).split("\n")
+    size = np.array([max(width_of(f"{line} ") for line in lines), LINE * em() * len(lines)]) * inch
+    low = place - size * ({"left": 0.0, "center": 0.5, "right": 1.0}[style["ha"]],
+                          {"bottom": 0.0, "center": 0.5, "top": 1.0}[style["va"]])
+    return place, style, np.array([low, low + size])
+
+
+def _covers(box, taken, points):
+    """How many other boxes a box covers, and how many points."""
+    return (sum((box[0] < of[1]).all() and (of[0] < box[1]).all() for of in taken),
+            np.count_nonzero((box[0] < points).all(axis=1) & (points < box[1]).all(axis=1)))
 
 
 def _colour(condition):

@@ -136,7 +136,7 @@ const MADE: &str = "report.html report.pdf open_in_paraview.py";
 /// The pictures, in alphabetical order.
 const PICTURES: &str = "contact-evolution damage damage-history deformed force-displacement \
      force-displacement-together mesh pressure pressure-together principal-stresses setting stress \
-     stress-damage";
+     stress-damage times";
 /// Curves of fields are `CURVES_….csv` and pictures.
 const CURVES: &str = "curves";
 /// The name of a file without its ending, in two parts at the first `_`; and the ending.
@@ -158,7 +158,7 @@ fn is_result(name: &str) -> bool {
     }
 }
 
-/// Whether `name` is the name of a report, a curve or a picture, which is `NAME[_tTIME].png`.
+/// Whether `name` is the name of a report, a curve or a picture, which is `NAME[_tTIME][_zoom].png`.
 fn is_made(name: &str) -> bool {
     let [kind, rest, ending] = parts(name);
     match ending {
@@ -166,7 +166,7 @@ fn is_made(name: &str) -> bool {
         "csv" | "png" | "svg" | "pdf" if kind == CURVES => true,
         "png" | "svg" | "pdf" | "gif" | "mp4" => {
             PICTURES.split(' ').any(|known| known == kind)
-                && (rest.is_empty() || rest.starts_with('t'))
+                && (rest.is_empty() || rest.starts_with('t') || rest == "zoom")
         }
         _ => false,
     }

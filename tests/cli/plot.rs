@@ -336,6 +336,43 @@ fn runs_have_colours_and_supports_styles() {
     assert_eq!(said, "{1} 12 {1}\n");
 }
 
+/// A block that is pressed on its flat foundation and slides along it, magnified: the foundation stays, and every node that
+/// touches it is on its line.
+#[test]
+fn a_flat_foundation_stays_at_its_place_under_a_magnified_body() {
+    let directory = TestDirectory::new();
+    let scene = directory.read("scene.toml").replace("symmetry = true", "displacement = ['0.01*t', 'free']");
+    directory.write("scene.toml", &scene);
+    directory.run(&["--set", "damage.lambda_u=0"]);
+    let draws = "import numpy as np\n\
+         results = read_results(Path('out/scene'))\n\
+         for factor in (1.0, 20.0):\n\
+         \x20   line, = results.foundation(factor)\n\
+         \x20   touching = results.places(factor)[(results.nodes[:, 1] == 0.0) & (results.gap == 0.0)]\n\
+         \x20   print(line[:, 1].tolist() == [0.0] * len(line), line[:, 0].min(), len(touching),\n\
+         \x20         touching[:, 0].max() <= line[:, 0].max() + 1.01 * results.displacement[:, 0].max())";
+    let Some(said) = python(&directory, draws) else { return };
+    assert_eq!(said, "True 0.0 5 True\nTrue 0.0 5 True\n");
+}
+
+#[test]
+fn maps_of_a_part_and_of_several_times_are_drawn_and_removed() {
+    let directory = TestDirectory::new();
+    directory.run(&["--set", "output.every=5"]);
+    let zoom = ["plot", "out/scene", "--only", "stress-damage,pressure", "--zoom", "0,0,0.5,0.5"];
+    let Some(said) = directory.say_python(&zoom) else { return };
+    assert_eq!(said.out, "out/scene/stress-damage_zoom.png\nout/scene/pressure.png\n");
+    let said = directory.say(&["plot", "out/scene", "--times", "0,0.5,1"]);
+    assert_eq!(said.out, "out/scene/times.png\n");
+    let said = directory.say(&["plot", "out/scene", "--zoom", "1,0,0,1"]);
+    assert!(said.code == Some(2) && said.err.contains("X0 < X1"), "{said:?}");
+    directory.say(&["plot", "out/scene", "--along", "bottom,top", "--quantity", "stress_yy"]);
+    let rows = directory.read("out/scene/curves_along_bottom,top_stress_yy.csv");
+    assert!(rows.starts_with("run,boundary,time,s,stress_yy"), "{rows}");
+    directory.run(&[]);
+    assert!(!directory.names("out/scene").iter().any(|name| name.ends_with(".png")));
+}
+
 #[test]
 fn curves_along_an_open_boundary_run_with_increasing_x_or_y() {
     let directory = TestDirectory::new();

@@ -59,21 +59,23 @@ for folder in map(Path, sys.argv[1:]):
     page = (folder / "report.html").read_text()
     tables = [[[html.unescape(cell) for cell in re.findall(r"<t[dh].*?>(.*?)</t[dh]>", row)]
                for row in re.findall(r"<tr>(.*?)</tr>", table)] for table in re.findall(r"<table>(.*?)</table>", page)]
-    labels = {of["label"]: name for name, of in figures.items() if "." not in name}
+    # A stress away from singular points names the distance; a surface may be the rest of the body.
+    labels = {of["label"].replace(" away from singular points", ", away"): name for name, of in figures.items() if "." not in name}
     for head, *rows in tables:
         name = ""
         for label, *cells in rows:
             if head[1:2] == ["over all steps"]:
-                of, row = figures[labels[label]], dict(zip(head[1:], cells))
+                of, row = figures[labels[re.sub(r", \S+ \S+ away$", ", away", label)]], dict(zip(head[1:], cells))
                 last = next((cell for title, cell in row.items() if title.startswith("last state")), "")
                 if "reached" not in cells[0]:
                     count += compared(f"{folder} {label}", cells[0], [of["governing"]["value"]])
                 count += compared(f"{folder} {label}, last", last, [of["value"]] if last else [])
             elif head[:1] == [""] and len(head) > 1:
                 name = label if label.strip() != "extreme" else name
+                part = name if any(key.startswith(f"{name}.") for key in figures) else "material"
                 for title, cell in zip(head[1:], cells):
                     title = re.sub(r" \([^()]*\)$", "", title)
-                    own = [of for key, of in figures.items() if key.rpartition(".")[0] == name and re.sub(
+                    own = [of for key, of in figures.items() if key.rpartition(".")[0] == part and re.sub(
                         rf" (of|at|in) ({name}\b|the rest of the body)|, [xy]$", "", of["label"]) == title]
                     if cell and "–" not in cell:
                         expected = [of["value"] if label == name else of["governing"]["value"] for of in own]
