@@ -44,8 +44,9 @@ EVOLUTION = 50
 SCRIPTS = "data.js", "locator.js", "body.js", "overlay.js", "charts.js", "viewer.js"
 IN_VIEWER = "deformed", "stress-damage", "principal-stresses"
 # The least height, inches, for the maps of the PDF on a page with other blocks: of their labels, and over that of a body that is as
-# wide as the page; and the largest such height. The largest height of the setting and of the pressure there.
-LEAST_LABELS, LEAST_BODY, LEAST_MAPS, LOW = 1.2, 2.8, 3.0, 2.2
+# wide as the page; and the largest such height. The largest height of the setting and of the pressure there, and of
+# the setting with many names.
+LEAST_LABELS, LEAST_BODY, LEAST_MAPS, LOW, HIGH, MANY = 1.2, 2.8, 3.0, 2.2, 4.0, 7
 # The limits of the model, for the head of the report.
 MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
 # What the processes draw, by name.
@@ -160,7 +161,7 @@ def said(figure, value, flagged=True):
     flag, _ = flag_of(figure)
     if flag and flagged:
         return f"{plain(value, 2)}, {flag}"
-    return value == figure["value"] and barred(value, figure["bar"]) or f"{float(f'{value:.4g}'):g}"
+    return value == figure["value"] and barred(value, figure["bar"]) or plain(value, 4)
 
 
 def reason(results, name, figure):
@@ -340,7 +341,8 @@ def write_pdf(path, results, arguments, everything):
         pages.text(ending, color=RED, weight="bold")
         errors = errors_of(summary)
         pages.table("Body, materials, and estimated relative errors", body(results) + [("", "")] * bool(errors) + errors)
-        drawing.use(size=SIZE, width=pages.beside if pages.beside > 2.5 else FULL, height=LOW)
+        is_many = len(results.summary.get("boundaries", {})) >= MANY
+        drawing.use(size=SIZE, width=FULL if is_many or pages.beside < 2.5 else pages.beside, height=HIGH if is_many else LOW)
         draw["setting"](figure=pages)
         pages.new_line()
         pages.table("Governing values", *governing(results))

@@ -26,8 +26,8 @@ FAR = 0.25
 MATERIALS = ("#edf1f5", "#f3e3c3", "#d5e8d4", "#e6d5ec", "#f7d4cd", "#cfe3f2")
 # The distance of names from their boundaries, inches; how many places of a name are tried, and how often all names are placed.
 AWAY, TRIED, MOST = 0.13, 10, 12
-# The largest width of a line of a name, over that of the picture.
-WIDEST = 0.28
+# The largest width of a line of a name, over that of the picture, and how much smaller names may make the body.
+WIDEST, SMALLEST = 0.28, 4.0
 
 
 def draw_setting(results, _limits, figure=None):
@@ -50,20 +50,23 @@ def draw_setting(results, _limits, figure=None):
     below = room_for_legend([words for _, words in entries], always=True)
     points = np.vstack([results.nodes, *outer])
     drawn = np.vstack([points[:0], *outer, *(_samples(line, SPACING * size)[0] for _, line in curves)])
-    inch = 0.0
-    # The length of an inch of the picture, m, follows from its box, and the box from the names.
-    for _ in range(MOST):
-        before, inch = inch, inch_of(np.array([points.min(axis=0), points.max(axis=0)]), below)
-        if abs(inch - before) < 1e-3 * inch:
-            break
+    first = inch = inch_of(np.array([points.min(axis=0), points.max(axis=0)]), below)
+    # The length of an inch of the picture, m, follows from its box, and the box from the names. These have shorter lines if
+    # little would be left for the body.
+    for number in range(MOST):
+        widest = WIDEST / (1 + 2 * number // MOST)
         names, taken = [], []
         for name, line, beyond in [*((name, line, beyond) for (name, line), beyond in zip(curves, outer)),
                                    *((of["name"], np.array(of["point"]), None) for of in probes)]:
+            name = _lines(name, widest)
             at = _beside(line, name, inch) if beyond is None else _outwards(line, name, beyond, inch)
             # The first of the best places.
-            names.append(min(at, key=lambda place: _covers(place[-1], taken, drawn)))
+            names.append((name, *min(at, key=lambda place: _covers(place[-1], taken, drawn))))
             taken.append(names[-1][-1])
         points = np.vstack([results.nodes, *outer, *taken])
+        before, inch = inch, min(inch_of(np.array([points.min(axis=0), points.max(axis=0)]), below), SMALLEST * first)
+        if abs(inch - before) < 1e-3 * inch < 0.99e-3 * SMALLEST * first:
+            break
 
     def paint(axes):
         # The body is on the left of its outlines, so the outlines of holes cut them out.
@@ -74,14 +77,14 @@ def draw_setting(results, _limits, figure=None):
             _draw_materials(axes, results)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, zorder=2)
         draw_foundation(axes, start)
-        for (name, line), force, (place, style, _) in zip(curves, arrows, names):
+        for (name, line), force, (lines, place, style, _) in zip(curves, arrows, names):
             condition = conditions.get(name, {})
             _draw_support(axes, line, condition, size)
             _draw_traction(axes, line, force, size)
-            axes.text(*place, _lines(name), color=_colour(condition), zorder=5, **style)
-        for probe, (place, style, _) in zip(probes, names[len(curves):]):
+            axes.text(*place, lines, color=_colour(condition), zorder=5, **style)
+        for probe, (lines, place, style, _) in zip(probes, names[len(curves):]):
             axes.plot(*probe["point"], marker="+", color=INK, zorder=4)
-            axes.text(*place, _lines(probe["name"]), fontsize="small", zorder=4.5,
+            axes.text(*place, lines, fontsize="small", zorder=4.5,
                       path_effects=[withStroke(linewidth=2.5, foreground="white")], **style)
         _draw_body_force(axes, results, time)
         for colour, words in entries:
@@ -301,15 +304,15 @@ def _beside(point, name, inch):
             for k in range(TRIED) for y, upright in ((1, "bottom"), (-1, "top")) for x, across in ((1, "left"), (-1, "right"))]
 
 
-def _lines(name):
-    """A name in lines."""
-    return "\n".join(wrapped(name, WIDEST * wide(7.2)))
+def _lines(name, widest):
+    """A name in lines, whose largest width is given over that of the picture."""
+    return "\n".join(wrapped(name, widest * wide(7.2)))
 
 
 def _aligned(place, style, name, inch):
     """A place of a name, its style, and the corners of its box."""
     style = {**style, "parse_math": False, "linespacing": 1.1, "multialignment": style["ha"]}
-    lines = _lines(name).split("\n")
+    lines = name.split("\n")
     size = np.array([max(width_of(f"{line} ") for line in lines), LINE * em() * len(lines)]) * inch
     low = place - size * ({"left": 0.0, "center": 0.5, "right": 1.0}[style["ha"]],
                           {"bottom": 0.0, "center": 0.5, "top": 1.0}[style["va"]])
