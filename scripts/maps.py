@@ -133,7 +133,7 @@ def _draw_sides(axes, pieces, points):
     a fine mesh."""
     sides = np.pad(pieces.along(pieces.sides(), points), ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     across = 72 * axes.figure.get_size_inches()[0] * axes.get_position().width
-    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    extent = np.ptp(points, axis=0)
     edge = across / extent[0] * np.sqrt(extent.prod() / len(pieces.elements))
     axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
 

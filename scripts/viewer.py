@@ -99,7 +99,7 @@ def about(results, everything, limits, origin):
         "singular": singular(results, number),
         "topPressure": limits.pressure if results.curves else 0, "stressTop": limits.stress, "largestLoad": limits.load,
         "leastGap": float(gaps.min()), "largestGap": float(gaps.max()),
-        "frames": [{"moment": state.moment, "loads": loads(state, origin), "foundation": foundation(state, origin)}
+        "frames": [{"moment": state.moment, "loads": loads(state, origin), "foundation": foundation(state, origin, limits.factor)}
                    for state in everything],
         "left_out": len(results.frames) - len(everything),
     }
@@ -134,12 +134,14 @@ def loads(state, origin):
             for points, moved, force, presses in loads_of(state)]
 
 
-def foundation(state, origin):
-    """The obstacle as polylines `at` + factor · `by`, for any factor of the displacements."""
-    once, twice = state.foundation(1.0), state.foundation(2.0)
-    if [line.shape for line in once] != [line.shape for line in twice]:
-        twice = once
-    return [{"at": rounded(2.0 * a - b - origin), "by": rounded(b - a)} for a, b in zip(once, twice)]
+def foundation(state, origin, magnified):
+    """The obstacle as polylines `at` + factor · `by`, as pictures show it for the factors 1 and `magnified` of the displacements."""
+    magnified = magnified if magnified > 1.0 else 2.0
+    true, other = state.foundation(1.0), state.foundation(magnified)
+    if [line.shape for line in true] != [line.shape for line in other]:
+        true = other
+    slopes = [(b - a) / (magnified - 1.0) for a, b in zip(true, other)]
+    return [{"at": rounded(a - by - origin), "by": rounded(by)} for a, by in zip(true, slopes)]
 
 
 def rounded(array):

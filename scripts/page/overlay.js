@@ -26,11 +26,16 @@ function ticks(low, high, count) {
   return found;
 }
 
-// A line of the screen, moved to its right by so many pixels at each point.
+// A line of the screen, moved to its right by so many pixels at each point. Its direction is that between points two pixels away,
+// because nodes may be closer than the rounding of pixels.
 function beside(line, far) {
+  const away = (k, step) => {
+    let at = k;
+    while (line[at + step] && Math.hypot(line[at][0] - line[k][0], line[at][1] - line[k][1]) < 2) at += step;
+    return line[at];
+  };
   return line.map(([x, y], k) => {
-    const [[ax, ay], [bx, by]] = [line[Math.max(k - 1, 0)], line[Math.min(k + 1, line.length - 1)]];
-    const part = far(k) / (Math.hypot(bx - ax, by - ay) || 1);
+    const [[ax, ay], [bx, by]] = [away(k, -1), away(k, 1)], part = far(k) / (Math.hypot(bx - ax, by - ay) || 1);
     return [x - part * (by - ay), y + part * (bx - ax)];
   });
 }

@@ -50,12 +50,13 @@ class View {
     const { run } = this, [contact, along] = [".contact", ".along"].map(name => this.root.querySelector(name));
     this.along = along;
     contact.hidden = !run.curves.length;
+    const tall = run.box[1][1] - run.box[0][1];
     this.contact = run.curves.map((curve, part) => {
       const place = contact.appendChild(document.createElement("div")), highest = run.topPressure / run.units.stress.factor;
       place.append(Object.assign(document.createElement("p"), { textContent: curve.title }));
       return new Chart(place, `arc length (${run.units.length.name})`,
         [`pressure (${run.units.stress.name})`, `gap (${run.units.length.name})`],
-        [[0, 1.08 * highest || 1], [Math.min(0, run.leastGap), 1.08 * run.largestGap || 1]]);
+        [[0, 1.08 * highest || 1], [Math.min(0, run.leastGap), run.largestGap > 1e-9 * tall ? 1.08 * run.largestGap : tall]]);
     });
   }
 
