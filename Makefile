@@ -30,9 +30,11 @@ WHEELS_PEERS := ngsolve scikit-fem 'scikit-sparse<0.5'
 # dpkg-shlibdeps finds the packages of the libraries.
 PACKAGES_DEB := dpkg-dev
 
-BINARY := target/release/signorini
+# cargo builds into CARGO_TARGET_DIR, if that is set.
+TARGET := $(or $(CARGO_TARGET_DIR),target)
+BINARY := $(TARGET)/release/signorini
 # The studies: a program of their own in validation/study.
-STUDIES := target/release/signorini-study
+STUDIES := $(TARGET)/release/signorini-study
 # The results tell what built the program, where this is a git checkout.
 export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
@@ -138,9 +140,9 @@ test: deps-test
 	$(PYTHON) -m compileall -q scripts validation
 	@{ cargo test --locked --workspace --no-fail-fast \
 	    --config "target.'cfg(unix)'.runner = ['$(CURDIR)/scripts/run_tests.sh']" 2>&1; \
-	    echo $$? >target/tests.code; } | tee target/tests.log
+	    echo $$? >$(TARGET)/tests.code; } | tee $(TARGET)/tests.log
 	@awk '/^test result/ { passed += $$4; failed += $$6 } END { print passed + 0 " passed, " failed + 0 " failed" }' \
-	    target/tests.log; exit $$(cat target/tests.code)
+	    $(TARGET)/tests.log; exit $$(cat $(TARGET)/tests.code)
 
 # pyNastran is in no package of Debian.
 nastran: deps-test

@@ -4,7 +4,6 @@
 mod vtu;
 
 use crate::test_directory::TestDirectory;
-use vtkio::model::CellType;
 use vtu::frame;
 
 fn field<'a>(data: &'a [(String, Vec<f64>)], name: &str) -> &'a [f64] {
@@ -23,7 +22,7 @@ fn the_last_frame_is_the_state_of_the_summary() {
     assert_eq!(time, 1.0);
     let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
     assert_eq!((frame.points.len(), frame.nodes.len()), (3 * 25, 32));
-    assert!(frame.types.iter().all(|kind| *kind == CellType::Triangle));
+    assert!(frame.types.iter().all(|kind| *kind == vtu::TRIANGLE));
     let sizes = |data: &[(String, Vec<f64>)], count: usize| -> Vec<(String, usize)> {
         data.iter().map(|(name, values)| (name.clone(), values.len() / count)).collect()
     };
@@ -79,7 +78,7 @@ fn frames_of_quadratic_displacements_have_quadratic_triangles() {
     let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
     // 25 vertices and 56 edges.
     assert_eq!((frame.points.len(), frame.nodes.len()), (3 * 81, 32));
-    assert!(frame.types.iter().all(|kind| *kind == CellType::QuadraticTriangle));
+    assert!(frame.types.iter().all(|kind| *kind == vtu::QUADRATIC_TRIANGLE));
     let summary = test_directory.summary("out/scene");
     assert_eq!((&summary["nodes"], &summary["triangles"]), (&81.into(), &32.into()));
     assert_eq!((&summary["contact_nodes"], &summary["active_nodes"]), (&9.into(), &9.into()));
@@ -120,7 +119,7 @@ fn the_contact_boundary_has_frames_of_its_own() {
     assert!(test_directory.read("out/scene/contact.pvd").contains(&file));
     let frame = frame(&test_directory.path(&format!("out/scene/{file}")));
     assert_eq!(frame.nodes, (0..4).map(|i| vec![i, i + 1]).collect::<Vec<_>>());
-    assert!(frame.types.iter().all(|kind| *kind == CellType::Line));
+    assert!(frame.types.iter().all(|kind| *kind == vtu::LINE));
     let rows = test_directory.read("out/scene/contact.csv");
     assert_eq!(rows.lines().count(), 1 + 11 * 5);
     assert!(

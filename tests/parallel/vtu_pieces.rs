@@ -62,7 +62,7 @@ fn close(a: &Values, b: &Values) {
 
 #[test]
 fn pieces_together_are_the_frame_of_one_rank() {
-    // Linear triangles, fewer than ranks: vtkio and meshio read no empty piece. Quadratic ones.
+    // Linear triangles, fewer than ranks: meshio reads no empty piece. Quadratic ones.
     for (order, cells, ranks) in [(1, 1, 4), (2, 4, 3)] {
         let directory = TestDirectory::new();
         directory.write("square.msh", &square(cells));
