@@ -138,6 +138,7 @@ test: deps-test
 	cargo clippy --locked --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps
 	$(PYTHON) -m compileall -q scripts validation
+	$(PYTHON) validation/words.py
 	@{ cargo test --locked --workspace --no-fail-fast \
 	    --config "target.'cfg(unix)'.runner = ['$(CURDIR)/scripts/run_tests.sh']" 2>&1; \
 	    echo $$? >$(TARGET)/tests.code; } | tee $(TARGET)/tests.log

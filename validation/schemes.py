@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Euler's steps and two-step differences with the same number of steps: the table of ACCURACY.md, section 3.
+"""Euler's steps and two-step differences with the same number of steps: results/schemes_zeta_min.csv.
 
     schemes.py [--binary PATH]
 

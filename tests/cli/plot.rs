@@ -1,7 +1,7 @@
 //! Pictures and reports, where there is a Python that draws them.
 
 use crate::test_directory::{ProgramOutput, SCENE, TestDirectory, sets, square};
-use std::{fs::File, process::Command};
+use std::fs::File;
 
 #[test]
 fn pictures_and_a_report_are_drawn_far_from_the_scripts() {

@@ -303,8 +303,6 @@ fn curves_and_the_python_module_give_the_exact_fields() {
     directory.say(&abscissa).fails(2, &["history.csv has no column none; it has step, time"]);
     let material = ["plot", "out/scene", "--material", "none"];
     directory.say(&material).fails(2, &["no triangle has the material none"]);
-    let alone = ["plot", "out/scene", "--times", "1"];
-    assert_eq!(directory.say(&alone).code, Some(2));
     // A column of a journal, without the margins that are cut off.
     let column = ["plot", "out/scene", "study.csv", "--width", "3.5"];
     directory.write("study.csv", "");
