@@ -200,7 +200,9 @@ def rows_of(folders, summaries, columns, settings=None):
     for folder, summary, of in zip(folders, summaries, settings):
         row = {"run": Path(folder).name, **{name: of.get(name) for name in names}}
         for name in columns:
-            row[name] = value_of(summary, name)
+            # A key that the runs set has its value already.
+            value = value_of(summary, name)
+            row[name] = of.get(name) if value is None else value
             row[f"{name}.bar"] = bars(summary).get(name)
             figure = (summary.get("figures") or {}).get(name) or {}
             row.update({f"{name}{flag}": figure.get(flag[1:]) for flag in FLAGS})

@@ -22,6 +22,7 @@ import itertools
 import os
 import re
 import signal
+import subprocess
 import sys
 import time
 import zlib
@@ -211,6 +212,28 @@ def run(command, idle, running):
 
 
 @contextmanager
+def unread():
+    """The reader of the output may go, as `| head` does: the study goes on without it."""
+    try:
+        yield
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def problem_of(arguments, command):
+    """Why no run of the study can start; "" if they can. The program reads the options of the first one."""
+    if arguments.jobs < 1:
+        return "--jobs must be at least 1"
+    scene = arguments.scene
+    if scene.startswith(("/dev/", "/proc/")) or os.path.exists(scene) and not os.path.isfile(scene):
+        return f"{scene} is no regular file, and each run reads the scene again; save it in a file"
+    cut = command.index("--") if "--" in command else len(command)
+    asked = [os.environ["SIGNORINI"], *command[:cut], "--help"]
+    tried = subprocess.run(asked, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    return tried.stderr.removeprefix("error: ").strip() if tried.returncode else ""
+
+
+@contextmanager
 def stopping(pool, running):
     """On a signal no more runs start, and those that are running end behind their step."""
     try:
@@ -237,7 +260,8 @@ def run_all(out, everything, inputs, jobs, columns, pictures):
     if first:
         warn_of_columns(columns, first)
     running = set()
-    print(f"{len(everything)} runs{f', {done} of them complete' * bool(done)}", flush=True)
+    with unread():
+        print(f"{len(everything)} runs{f', {done} of them complete' * bool(done)}", flush=True)
 
     def attempt(of):
         with claim(locks, of[0]) as is_free:
@@ -254,7 +278,8 @@ def run_all(out, everything, inputs, jobs, columns, pictures):
                         continue
                     done, folder = done + 1, open_runs[k][0]
                     failed.update({folder: error} if error else {})
-                    print(f"{done}/{len(everything)} {folder.name}{': ' + error if error else ''}", flush=True)
+                    with unread():
+                        print(f"{done}/{len(everything)} {folder.name}{': ' + error if error else ''}", flush=True)
                     if not first and not error:
                         first = folder
                         warn_of_columns(columns, first)
@@ -302,23 +327,29 @@ def main(prog=None):
     named = [(label, product if label else case + product) for label, case in cases for product in products]
     folders = [out / name for name in names_for(named)]
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
+    if problem := problem_of(arguments, commands[0]):
+        print(f"error: {problem}", file=sys.stderr)
+        return 2
     pictures = []
     if arguments.plot:
         # matplotlib would follow a file matplotlibrc in the current folder, which can name programs.
         with chdir("/"):
             from study_pictures import drawn, paths_of
         pictures = [path for paths in paths_of(out, arguments.plot, ["png"]).values() for path in paths]
+    columns = [name for name in arguments.columns or [] if name not in head + keys]
     failed = run_all(out, list(zip(folders, commands)), inputs_of(arguments.scene), arguments.jobs,
-                     [*(arguments.columns or []), *arguments.plot], pictures)
+                     [*columns, *arguments.plot], pictures)
     summaries = [outcome(folder, failed.get(folder, "")) for folder in folders]
     rows, units = rows_of(folders, summaries, arguments.columns or columns_of(summaries), list(map(dict, chosen)))
-    printed(rows, units)
     with whole(out / "study.csv", is_of_study) as part:
         write_table(rows, part, units)
-    print(out / "study.csv")
-    is_refused = refused(arguments.columns, list(filter(None, summaries)))
+    with unread():
+        printed(rows, units)
+        print(out / "study.csv", flush=True)
+    is_refused = refused(columns, list(filter(None, summaries)))
     if arguments.plot:
-        is_refused |= not drawn(folders, summaries, arguments.plot, out, settings=list(map(dict, chosen)))
+        with unread():
+            is_refused |= not drawn(folders, summaries, arguments.plot, out, settings=list(map(dict, chosen)))
     return 1 if failed else 2 if is_refused else 0
 
 

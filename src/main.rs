@@ -3,14 +3,17 @@
 
 mod command;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::{
+    CommandFactory, Parser, Subcommand,
+    error::{ContextKind, ContextValue},
+};
 use command::Failure;
 use signorini::{
     output::terminal::{keep, lost},
     petsc::Allocator,
     printable::printable,
 };
-use std::{path::PathBuf, process::ExitCode};
+use std::{ffi::OsString, path::PathBuf, process::ExitCode};
 
 #[global_allocator]
 static ALLOCATOR: Allocator = Allocator { out_of_memory: command::out_of_memory };
@@ -111,9 +114,32 @@ fn main() -> ExitCode {
     execute().into()
 }
 
+/// The words of the command line. `help NAME` is `NAME --help`, as a script prints its own help.
+fn words() -> Vec<OsString> {
+    let mut words = command::words();
+    if words.len() == 3 && words[1] == "help" {
+        words.remove(1);
+        words.push("--help".into());
+    }
+    words
+}
+
+/// Adds the most similar subcommand to the error of an unknown one. clap finds none that differs by swapped letters in a short word.
+fn suggest(error: &mut clap::Error) {
+    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) {
+        let (program, word) = (Arguments::command(), word.clone());
+        let likeness = |name: &&str| strsim::normalized_damerau_levenshtein(&word, name);
+        let names = program.get_subcommands().map(clap::Command::get_name);
+        let near = names.filter(|name| likeness(name) >= 0.5);
+        let near = near.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+        let near = near.map(|name| ContextValue::Strings(vec![name.to_owned()]));
+        near.map(|near| error.insert(ContextKind::SuggestedSubcommand, near));
+    }
+}
+
 /// Does the command of the command line, and returns the exit code.
 fn execute() -> u8 {
-    let command = match Arguments::try_parse_from(command::words()) {
+    let command = match Arguments::try_parse_from(words()) {
         Ok(arguments) => arguments.command,
         Err(error) => return refuse(error),
     };
@@ -160,8 +186,9 @@ fn execute() -> u8 {
 /// Prints an error of the arguments, or the help, and returns the exit code. The error shows the arguments as the terminal may
 /// have them.
 fn refuse(error: clap::Error) -> u8 {
-    let words = command::words().into_iter().map(|word| printable(&word.to_string_lossy()));
-    let error = Arguments::try_parse_from(words).err().unwrap_or(error);
+    let words = words().into_iter().map(|word| printable(&word.to_string_lossy()));
+    let mut error = Arguments::try_parse_from(words).err().unwrap_or(error);
+    suggest(&mut error);
     keep(error.print());
     lost().iter().for_each(|error| command::tell("error", error));
     if lost().is_some() { 1 } else { error.exit_code() as u8 }

@@ -16,6 +16,8 @@ const LOCKING: f64 = 0.45;
 const CONTRAST: f64 = 1e5;
 /// A note is given if obstacles overlap the body by more than this fraction of its size.
 const OVERLAP: f64 = 1e-9;
+/// A note is given if a surface load exceeds this fraction of the largest E: strains are of the order of load/E, and must be small.
+const LARGE_LOAD: f64 = 0.1;
 /// A note is given if a triangle has a smaller angle, degrees.
 const SLIVER: f64 = 1.0;
 
@@ -48,6 +50,7 @@ impl DiscreteProblem {
                 )
             }),
             scene.units.contradiction(),
+            self.large_load(),
             (scene.materials().any(|material| material.density > 0.0)
                 && scene.gravity.iter().all(|g| g.as_constant() == Some(0.0)))
             .then(|| "material.density has no effect without body.gravity".to_owned()),
@@ -77,6 +80,27 @@ impl DiscreteProblem {
         ];
         notes.extend(others.into_iter().flatten());
         notes
+    }
+
+    /// A note on the largest surface load, if it is large beside E of the stiffest material.
+    pub fn large_load(&self) -> Option<String> {
+        let (scene, mesh, mut largest) = (self.scene(), self.mesh(), (0.0, ""));
+        let times = scene.sample_times(SAMPLE_TIMES);
+        for boundary in &scene.boundaries {
+            for edge in mesh.edges_of(&boundary.name) {
+                let (at, normal) = (mesh.midpoint(*edge), mesh.edge_normal(*edge).0);
+                for f in boundary.loads().flat_map(|f| times.iter().map(|&t| f.at(at, normal, t))) {
+                    let load = f[0].hypot(f[1]);
+                    largest = if load > largest.0 { (load, &*boundary.name) } else { largest };
+                }
+            }
+        }
+        let young = scene.materials().map(|material| material.young).fold(0.0, f64::max);
+        let ((load, name), unit) = (largest, &scene.units.stress);
+        let note = format!(
+            "the load {load:.1e} {unit} on `{name}` is more than a tenth of E = {young:e} {unit}"
+        );
+        (load > LARGE_LOAD * young).then(|| note + ": are the units consistent?")
     }
 
     /// A note on the foundation that overlaps the body most at the start, as for a press fit.

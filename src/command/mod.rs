@@ -236,9 +236,11 @@ pub fn solvers() -> Result<(), Failure> {
     Ok(())
 }
 
-/// `signorini completions SHELL`.
-pub fn completions(shell: clap_complete::Shell, mut program: clap::Command) -> Result<(), Failure> {
+/// `signorini completions SHELL`. A run takes further solvers, as `tao:bnls`, but these names are offered.
+pub fn completions(shell: clap_complete::Shell, program: clap::Command) -> Result<(), Failure> {
     let mut script = Vec::new();
+    let mut program =
+        program.mut_subcommand("run", |run| run.mut_arg("solver", |of| of.value_parser(SOLVERS)));
     clap_complete::generate(shell, &mut program, "signorini", &mut script);
     say(String::from_utf8_lossy(&script).trim_end());
     Ok(())
@@ -254,6 +256,7 @@ pub fn mesh(scenes: &[PathBuf], set: &[String]) -> Result<(), Failure> {
     require_one_process()?;
     for path in scenes {
         let scene = Scene::read(path, set).map_err(Failure::input)?;
+        scene.check_mesh_file().map_err(Failure::input)?;
         let mesh = read_mesh(&scene, false)?;
         mesh.notes.iter().for_each(|note| tell("note", note));
         let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());

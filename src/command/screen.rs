@@ -33,6 +33,7 @@ pub fn open(task: &Task) -> Progress {
     let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
     let steps = |grid| steps(grid, &scene.units.time, task.problem.damage().is_some());
     lines.extend(scene.time.map(|grid| row("time", steps(grid))));
+    lines.extend(task.problem.large_load().map(|note| row("note", note)));
     say(&lines.join("\n"));
 
     let mut progress = Progress::new(LENGTH);
@@ -118,7 +119,7 @@ pub fn conclusion(
     let (Some(last), Some(figures)) = (last, figures) else {
         return [end].into_iter().chain(notes).collect();
     };
-    let mut lines = vec![end, row("damage", damage(task, figures, outcome))];
+    let mut lines = vec![end, row("damage", damage(task, last.step, figures, outcome))];
     lines.push(row("displacement", displacement(task, figures)));
     lines.push(row("work", figures.full_text("work")));
     lines.extend(stresses(task, figures));
@@ -142,9 +143,10 @@ pub fn conclusion(
 }
 
 /// The damage of the last state.
-fn damage(task: &Task, figures: &LastFigures, outcome: Option<&Outcome>) -> String {
-    let state = match figures.value("zeta_min") {
-        1.0 => "none".to_owned(),
+fn damage(task: &Task, step: usize, figures: &LastFigures, outcome: Option<&Outcome>) -> String {
+    let state = match (figures.value("zeta_min"), step) {
+        (1.0, 1) if task.problem.damage().is_some() => "none yet: shorten time.step".to_owned(),
+        (1.0, _) => "none".to_owned(),
         _ => format!("min ζ {}, mean ζ {}", figures.text("zeta_min"), figures.text("zeta_mean")),
     };
     match outcome.and_then(|outcome| outcome.stopped) {
@@ -261,7 +263,7 @@ fn support(name: &str, figures: &LastFigures) -> String {
     row("support", format!("{name}: force ({x}, {y}) {unit}{contact}, moment {moment}"))
 }
 
-/// The line of a probe with its displacement, von Mises stress and damage.
+/// The line of a probe with its displacement, stresses and damage.
 fn probe(task: &Task, name: &str, figures: &LastFigures) -> String {
     let [x, y, zeta] = ["u_x", "u_y", "zeta"].map(|of| figures.text(&format!("{name}.{of}")));
     let unit = &task.problem.scene().units.length;
@@ -270,7 +272,9 @@ fn probe(task: &Task, name: &str, figures: &LastFigures) -> String {
         Some(_) => format!(", ζ {zeta}"),
         None => String::new(),
     };
-    row("probe", format!("{name}: u ({x}, {y}) {unit}, von Mises {von_mises}{zeta}"))
+    let [xx, yy, xy] = ["xx", "yy", "xy"].map(|of| figures.text(&format!("{name}.stress_{of}")));
+    let stress = format!("σ_xx {xx}, σ_yy {yy}, σ_xy {xy}, von Mises {von_mises}");
+    row("probe", format!("{name}: u ({x}, {y}) {unit}, {stress}{zeta}"))
 }
 
 pub fn row(name: &str, value: String) -> String {

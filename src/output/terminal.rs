@@ -69,6 +69,9 @@ pub fn plain(value: f64, digits: usize) -> String {
 /// The time between two lines of progress without a terminal.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
+/// The time left is shown after this time, or this part of the work: the first steps may be slower or shorter than the others.
+const KNOWN_AFTER: (Duration, f64) = (Duration::from_secs(10), 0.05);
+
 /// The least length of the bar behind the fields of progress.
 const LEAST_BAR: usize = 8;
 
@@ -77,6 +80,8 @@ pub struct Progress {
     bar: ProgressBar,
     started: Instant,
     last_line: Instant,
+    /// Times spent and parts of the work done: the rate since the first is that of the last half to three quarters of the time.
+    marks: [(Duration, f64); 2],
 }
 
 impl Progress {
@@ -86,7 +91,7 @@ impl Progress {
         if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar}") {
             bar.set_style(style);
         }
-        Self { bar, started: now, last_line: now }
+        Self { bar, started: now, last_line: now, marks: Default::default() }
     }
 
     /// Shows the `position` of the work on the length, with `fields`, the most important ones first.
@@ -95,7 +100,13 @@ impl Progress {
         let spent = self.started.elapsed();
         let words =
             |time: Duration| humantime::format_duration(Duration::from_secs(time.as_secs()));
-        let left = Duration::try_from_secs_f64(spent.as_secs_f64() * (1.0 / part - 1.0));
+        if spent >= 2 * self.marks[1].0 {
+            self.marks = [self.marks[1], (spent, part)];
+        }
+        let (since, done) = self.marks[0];
+        let left = (spent - since).as_secs_f64() * (1.0 - part) / (part - done);
+        let is_known = spent >= KNOWN_AFTER.0 || part >= KNOWN_AFTER.1;
+        let left = Duration::try_from_secs_f64(if is_known { left } else { f64::NAN });
         let left = left.map_or_else(|_| String::new(), |left| format!(", {} left", words(left)));
         fields.insert(0, format!("{:>3.0} % after {}{left}", 100.0 * part, words(spent)));
         if !self.bar.is_hidden() {

@@ -113,10 +113,31 @@ impl SceneText {
         if *position == NOWHERE || position.start >= self.stride {
             return problem;
         }
-        let value = AnnotationKind::Primary.span(position.clone());
+        let place = self.place_in_text(position, message).unwrap_or_else(|| position.clone());
+        let value = AnnotationKind::Primary.span(place);
         let lines = Snippet::source(self.file.as_str()).annotation(value);
         let lines = Renderer::plain().render(&[Group::with_level(Level::ERROR).element(lines)]);
         format!("{problem}\n{lines}")
+    }
+
+    /// The place in a text of the file without escapes: the column, or the name, that the message about it calls wrong.
+    fn place_in_text(&self, position: &Range<usize>, message: &str) -> Option<Range<usize>> {
+        let value = self.file.get(position.clone())?;
+        let quote = value.chars().next_back().filter(|last| ['"', '\''].contains(last))?;
+        let start = value.find(quote)? + 1;
+        let text = value.get(start..value.len() - 1).filter(|text| !text.contains('\\'))?;
+        let (at, length) = if let Some((_, rest)) = message.split_once(" at column ") {
+            let column: usize = rest.split(' ').next()?.parse().ok()?;
+            let rest = text.char_indices().nth(column - 1);
+            rest.map_or((text.len(), 1), |(at, found)| (at, found.len_utf8()))
+        } else {
+            let name = message.split_once(" has the unknown ")?.1.split('`').nth(1)?;
+            let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
+            let word = words.into_iter().find(|word| *word == name)?;
+            (word.as_ptr().addr() - text.as_ptr().addr(), name.len())
+        };
+        let start = position.start + start + at;
+        Some(start..start + length)
     }
 
     /// The number of the line that contains the byte `at`.

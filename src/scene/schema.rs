@@ -3,6 +3,7 @@
 
 use super::document::{NOWHERE, Problem, SceneText, below, name_of};
 use super::expression::{Expression, NOT_CONSTANT, Scope, WITHOUT_VALUE, refused_name};
+use super::units::without_prefix;
 use crate::suggestion::suggestion;
 use serde::de::{Deserialize, DeserializeOwned, IntoDeserializer};
 use serde_json::Value as Schema;
@@ -303,7 +304,10 @@ fn read_value(value: &Value, schema: &Schema, scope: &Scope) -> Result<Value, St
         _ => match evaluated.filter(|_| value.is_str()) {
             Some(Ok(number)) => format!(", but is {value} = {number:?}"),
             Some(Err(error)) if !scope.constants.is_empty() => format!(", but {value} {error}"),
-            _ => format!(", but is {value}"),
+            _ => format!(
+                ", but is {value}{}",
+                value.as_str().and_then(without_prefix).unwrap_or_default()
+            ),
         },
     };
     match number {

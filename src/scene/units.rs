@@ -10,6 +10,15 @@ fn power(unit: &str, base: &str) -> Option<i32> {
     PREFIXES.iter().find(|(known, _)| *known == prefix).map(|(_, power)| *power)
 }
 
+/// The end of a message about a number with a unit: `30e9 (Pa)` in place of `30 GPa`.
+pub(super) fn without_prefix(text: &str) -> Option<String> {
+    let (number, unit) = text.split_at(text.rfind(|c: char| c.is_ascii_digit())? + 1);
+    let power = |base: &&str| power(unit.trim(), base);
+    let base = ["Pa", "N", "m"].into_iter().find(|base| power(base).is_some())?;
+    let number = format!("{}e{}", number.trim(), power(&base)?);
+    number.parse::<f64>().is_ok().then(|| format!(": write {number} ({base}), without a unit"))
+}
+
 /// The names of a scene's units. They label the results; the program converts no units.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Units {

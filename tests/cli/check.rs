@@ -39,6 +39,39 @@ fn a_scene_that_cannot_be_solved_is_refused_after_its_mesh_is_described() {
     assert_eq!(said.out, "");
 }
 
+/// A load beyond a tenth of E is noted before any solve, by `check` and by `run`; one below is not. Pressures and tractions
+/// count, at any time.
+#[test]
+fn loads_that_are_large_beside_the_modulus() {
+    let directory = TestDirectory::new();
+    let large = "boundary.top.traction=['-7*t', '-7*t']";
+    for (set, is_noted) in [
+        ("boundary.top.traction=[0, '-7.9*t']", false),
+        (large, true),
+        ("boundary.top.traction=[0, '-8.1*(1-abs(2*t-1))']", true),
+        ("material.young=29", true),
+    ] {
+        let said = directory.say(&["check", "scene.toml", "--set", set]);
+        assert_eq!(said.out.contains("is more than a tenth of E = "), is_noted, "{set}: {said:?}");
+    }
+    let said = directory.run(&["--set", large]).out;
+    let note = "the load 9.9e0 Pa on `top` is more than a tenth of E = 8e1 Pa: are the units";
+    assert!(said.find(note) < said.find("  end  ") && said.contains(note), "{said}");
+}
+
+/// A probe shows the stresses of a uniform state, σ_yy = −3; the damage of a run of one step has a reason.
+#[test]
+fn the_closing_lines_show_stresses_at_probes_and_why_there_is_no_damage() {
+    let directory = TestDirectory::new();
+    let probe = "probe=[{name='A', point=[0.5, 0.5]}]";
+    let said = directory.run(&["--set", probe, "--set", "time.step=1"]).out;
+    let line = said.lines().find(|line| line.starts_with("  probe")).expect("a probe");
+    for text in ["A: u (", "σ_xx ", "σ_yy -3", "σ_xy ", "von Mises 3", "ζ 1"] {
+        assert!(line.contains(text), "no `{text}` in {line}");
+    }
+    assert!(said.contains("none yet: shorten time.step"), "{said}");
+}
+
 #[test]
 fn results_are_described() {
     let test_directory = TestDirectory::new();

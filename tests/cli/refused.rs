@@ -104,8 +104,15 @@ fn arguments() {
     );
     assert!(!test_directory.path("out/compare").exists());
     test_directory.say(&["run"]).fails(2, &["<SCENE>"]);
-    test_directory.say(&["rnu", "scene.toml"]).fails(2, &["unrecognized subcommand 'rnu'"]);
+    for word in ["rnu", "urn", "runn", "ru"] {
+        let problem = format!("unrecognized subcommand '{word}'");
+        let said = test_directory.say(&[word, "scene.toml"]);
+        said.fails(2, &[&problem, "a similar subcommand exists: 'run'"]);
+    }
+    assert!(!test_directory.say(&["xyz"]).err.contains("similar"));
     test_directory.say(&["run", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
+    let none = test_directory.say(&["mesh", "scene.toml", "--set", "mesh.file=none.msh"]);
+    none.fails(2, &["scene.toml, --set mesh.file=none.msh: mesh.file cannot be read: none.msh"]);
     test_directory.say(&["mesh", "none.toml"]).fails(2, &["none.toml: the scene cannot be read"]);
     assert_eq!(test_directory.say(&[]).code, Some(2));
 }
@@ -182,6 +189,32 @@ fn help_and_version_are_no_errors() {
         assert_eq!(said.code, Some(0));
         assert!(said.out.contains(fragment) && said.err.is_empty(), "{said:?}");
     }
+}
+
+/// `help NAME` is `NAME --help` for each subcommand, also where a script has the help.
+#[test]
+fn help_of_a_subcommand_is_its_own() {
+    let directory = TestDirectory::new();
+    for name in ["run", "check", "study", "table", "plot"] {
+        let [before, after] = [["help", name], [name, "--help"]].map(|of| directory.say(&of));
+        assert_eq!((before.code, &before.out), (after.code, &after.out), "{name}");
+    }
+    if let Some(said) = directory.say_python(&["help", "study"]) {
+        assert!(said.out.contains("--cases FILE.csv"), "{said:?}");
+    }
+}
+
+/// Completions offer the names that `signorini solvers` lists, and a run takes others as well.
+#[test]
+fn completions_offer_the_solvers() {
+    let directory = TestDirectory::new();
+    let solvers = directory.say(&["solvers"]).out;
+    let names: Vec<&str> = solvers.lines().filter_map(|line| line.split('\t').next()).collect();
+    let script = directory.say(&["completions", "bash"]).out;
+    let offered = script.split("--solver)").nth(1).and_then(|rest| rest.lines().nth(1));
+    let offered = offered.expect("the values of --solver");
+    assert!(offered.contains(&names.join(" ")), "{offered}");
+    directory.run(&["--solver", "tao:bnls"]);
 }
 
 #[test]

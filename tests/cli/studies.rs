@@ -271,6 +271,39 @@ fn a_failing_run_of_a_study_is_told_and_the_others_go_on() {
     directory.say(&twice).fails(2, &["--set time.end is given twice"]);
 }
 
+/// A study that cannot start is refused once, before it makes a folder. One whose reader goes ends complete, and a column of a
+/// varied key has its values.
+#[test]
+fn a_study_is_complete_or_refused() {
+    let directory = TestDirectory::new();
+    let words = ["study", "scene.toml", "--set", "material.young=80,160", "--out", "out/s"];
+    for (more, problem) in [
+        (&["--jobs", "0"][..], "--jobs must be at least 1"),
+        (&["--", "--acuracy", "0.1"], "unexpected argument '--acuracy'"),
+        (&["--", "--accuracy", "low"], "write a number with a decimal point"),
+    ] {
+        let Some(said) = directory.say_python(&[&words[..], more].concat()) else { return };
+        said.fails(2, &[problem]);
+        assert_eq!(said.err.matches("error: ").count(), 1, "{said:?}");
+    }
+    let piped = [&["study", "/dev/stdin"], &words[2..]].concat();
+    directory.say(&piped).fails(2, &["/dev/stdin is no regular file"]);
+    assert!(!directory.path("out").exists());
+
+    let program = env!("CARGO_BIN_EXE_signorini");
+    let line =
+        format!("'{program}' {} --columns material.young,work; echo $? > code", words.join(" "));
+    let status = Command::new("sh")
+        .args(["-c", &format!("{{ {line}; }} | head -1 > first")])
+        .current_dir(directory.path("."))
+        .status();
+    assert!(status.expect("sh").success());
+    assert_eq!(directory.read("code"), "0\n");
+    let table = directory.read("out/s/study.csv");
+    assert!(table.starts_with("run,material.young,work (J/m)"), "{table}");
+    assert!(table.contains(",80,") && table.contains(",160,"), "{table}");
+}
+
 /// Uniform pressure 3 on the unit square: u_y = −3 y/E, σ_yy = −3.
 #[test]
 fn curves_and_the_python_module_give_the_exact_fields() {

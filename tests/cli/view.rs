@@ -7,10 +7,14 @@ use std::process::Command;
 fn looked_at(directory: &TestDirectory, folder: &str) -> Option<String> {
     let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
     let program = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cli/viewer.py");
-    let ran = Command::new(python).args([program, folder]).current_dir(directory.path(".")).output();
+    let ran =
+        Command::new(python).args([program, folder]).current_dir(directory.path(".")).output();
     let ran = ran.expect("Python");
     let [out, err] = [ran.stdout, ran.stderr].map(|text| String::from_utf8(text).expect("UTF-8"));
-    if err.contains("No module named") || err.contains("NoSuchDriverException") || err.contains("/usr/bin/chrom") {
+    if err.contains("No module named")
+        || err.contains("NoSuchDriverException")
+        || err.contains("/usr/bin/chrom")
+    {
         eprintln!("skipped: {err}");
         return None;
     }

@@ -124,12 +124,34 @@ error: bad.toml:20: time.step must be a number: positive (s), or "auto", but is 
 error: bad.toml:33: boundary.load.traction[1] has the unknown variable `s` (known: x, y, t, pi, sin, cos, tan, sqrt, exp, log, abs, min, max, atan2, if, table, spline, pchip)
    |
 33 | traction = ["0", "-80*s"]
-   |                  ^^^^^^^
+   |                       ^
 error: bad.toml:39: boundary.axis has a symmetry and a gap; an edge can have only one of them: give the other to another boundary, which may end at this one
    |
 39 | [[boundary]]
    | ^^^^^^^^^^^^"#
     );
+}
+
+/// The caret stands below the wrong column, name or missing end of an expression, in both kinds of quotes; below all of it
+/// where escapes move the columns.
+#[test]
+fn the_wrong_place_in_an_expression_is_underlined() {
+    for (value, carets) in [
+        (r#""x + sin(""#, "         ^"),
+        (r#""xx + sin(""#, " ^^"),
+        (r#"'sin(x) + s'"#, "          ^"),
+        (r#""1 - (x""#, "       ^"),
+        (r#""é + 3 )""#, " ^"),
+        (r#""3*t )""#, "     ^"),
+        (r#""\u0033 )""#, "^^^^^^^^^^"),
+    ] {
+        let text = BASE.replacen("\"-80*t\"", value, 1);
+        let refusal = refusal(&text);
+        let line = refusal.lines().find(|line| line.ends_with('^')).expect("carets");
+        let place = line.split_once("| ").expect("a margin").1;
+        let before = "traction = [\"0\", ";
+        assert_eq!(place.strip_prefix(&" ".repeat(before.len())), Some(carets), "{refusal}");
+    }
 }
 
 #[test]
