@@ -2,7 +2,7 @@
 
 use super::words;
 use serde_json::{Value, json};
-use signorini::petsc;
+use signorini::petsc::{self, Communicator};
 use std::{env, fs, thread, time::SystemTime};
 
 /// `provenance` of `summary.json` of a run whose mesh this version of gmsh made. Unknown values are null.
@@ -35,7 +35,12 @@ fn commit() -> Option<&'static str> {
 /// The version of the program, its commit, and PETSc's version and file. They stay for the life of the process, as clap wants.
 pub fn version() -> &'static str {
     let commit = commit().unwrap_or("not recorded: it was built without make");
-    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| "its file is not known".into());
+    let unknown = if Communicator::HAS_MPI {
+        "its file is not known"
+    } else {
+        "within the program, without MPI"
+    };
+    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| unknown.into());
     let [version, of_petsc] = [env!("CARGO_PKG_VERSION"), &petsc::version()];
     format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}").leak()
 }
