@@ -50,7 +50,7 @@ cp /usr/share/common-licenses/{GPL-2,GPL-3,LGPL-2.1,Apache-2.0} "$folder/license
 } >"$folder/licenses/SOURCES"
 
 [ ! -e "$folder/petsc/static/lib/libpetsc.a" ] || exit 0
-"${PYTHON:-python3}" -m pip -q download --no-deps --no-binary :all: "petsc==$PETSC"
+"${PYTHON:-python3}" -m pip -q download --no-deps --no-binary petsc "petsc==$PETSC"
 rm -rf "$folder/petsc" && mkdir "$folder/petsc"
 tar xf "petsc-$PETSC.tar.gz" --strip-components=1 -C "$folder/petsc"
 cp "$folder/petsc/LICENSE" "$folder/licenses/PETSc"

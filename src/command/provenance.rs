@@ -45,10 +45,13 @@ pub fn version() -> &'static str {
     format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}").leak()
 }
 
-/// The names of the files of PETSc, of its factors and of BLAS; they end with their versions.
+/// The names of the files of PETSc, of its factors and of BLAS; they end with their versions. A PETSc without MPI is within the
+/// program, as in the wheel.
 fn libraries() -> Vec<String> {
     let files = loaded(&["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"]);
-    files.iter().filter_map(|file| file.rsplit('/').next()).map(str::to_owned).collect()
+    let within = (!Communicator::HAS_MPI).then(|| format!("petsc-{}", petsc::version()));
+    let names = files.iter().filter_map(|file| file.rsplit('/').next()).map(str::to_owned);
+    names.chain(within).collect()
 }
 
 /// The files of these libraries that this process has loaded, from Linux (proc(5), maps).
