@@ -29,6 +29,10 @@ PACKAGES_PEERS := python3-getfem python3-venv python3-dev
 WHEELS_PEERS := ngsolve scikit-fem 'scikit-sparse<0.5'
 # dpkg-shlibdeps finds the packages of the libraries.
 PACKAGES_DEB := dpkg-dev
+# gfortran brings libgfortran.a, which Debian's OpenBLAS needs.
+PACKAGES_WHEEL := libsuitesparse-dev libclang-dev pkg-config gcc gfortran make python3-venv
+# The gmsh of a wheel: its stand-ins for libraries of windows are made for this one.
+GMSH_WHEEL := 4.15.2
 
 # cargo builds into CARGO_TARGET_DIR, if that is set.
 TARGET := $(or $(CARGO_TARGET_DIR),target)
@@ -40,7 +44,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin
 
-.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb mesh run plot keys viewer test nastran validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb wheel mesh run plot keys viewer test nastran validate random compare \
     bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
@@ -50,6 +54,7 @@ help:
 	@echo 'make deps       install the Debian packages that are missing'
 	@echo 'make build      $(BINARY) and $(notdir $(STUDIES))'
 	@echo 'make deb        a Debian package for this release of Debian, in target/debian'
+	@echo 'make wheel      a wheel for pip, for every Linux with a glibc as new as that of this machine, in target/wheels'
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make plot       the pictures of every run in out/, again; or ARGS="--animate --format svg"'
@@ -105,6 +110,25 @@ deb: build
 	scripts/package.sh $(BINARY) target/package
 	cargo deb --locked --no-build --strip
 	@ls -sh target/debian/*.deb
+
+# The tools are in a virtual environment. The libraries and the program have folders of their own: they are other ones than those of
+# `make build`.
+WHEEL := target/wheel
+wheel:
+	@scripts/deps.sh $(PACKAGES_WHEEL)
+	$(PYTHON) -m venv $(WHEEL)/tools
+	$(WHEEL)/tools/bin/pip install --quiet wheel auditwheel
+	PYTHON=$(CURDIR)/$(WHEEL)/tools/bin/python scripts/wheel/libraries.sh $(WHEEL)
+	PETSC_DIR=$(CURDIR)/$(WHEEL)/petsc PETSC_ARCH=static PKG_CONFIG_PATH=$(CURDIR)/$(WHEEL)/lib/pkgconfig \
+	    cargo build --release --locked --bin signorini --target-dir $(WHEEL)/cargo
+	strip -o $(WHEEL)/signorini $(WHEEL)/cargo/release/signorini
+	$(WHEEL)/tools/bin/pip install --quiet --no-deps --target $(WHEEL)/gmsh --upgrade gmsh==$(GMSH_WHEEL)
+	rm -rf $(WHEEL)/stand_ins target/wheels && mkdir $(WHEEL)/stand_ins
+	scripts/wheel/stand_ins.sh $(WHEEL)/gmsh/lib/libgmsh.so* $(WHEEL)/stand_ins
+	$(WHEEL)/tools/bin/python scripts/wheel/wheel.py $(WHEEL)/signorini $(WHEEL)/stand_ins $(WHEEL)/licenses $(GMSH_WHEEL) target/wheels
+	$(WHEEL)/tools/bin/auditwheel show target/wheels/*.whl
+	scripts/wheel/check.sh target/wheels/*.whl
+	@ls -sh target/wheels/*.whl
 
 mesh: build
 	$(BINARY) mesh $(SCENE)

@@ -1,7 +1,8 @@
 //! Finds PETSc, MPI, CHOLMOD, LAPACK and BLAS, and declares an explicit list of their functions to Rust.
 //!
 //! pkg-config knows PETSc: that of `PETSC_DIR` and `PETSC_ARCH`, else of `PKG_CONFIG_PATH`, else the system's. The
-//! compiler that built PETSc (mpicc) knows MPI. What is missing is told in one sentence.
+//! compiler that built PETSc (mpicc) knows MPI. A PETSc that was built without MPI has a stand-in for it (MPIUNI); then the cfg
+//! `petsc_without_mpi` is set. Without an interface to CHOLMOD in PETSc `petsc_without_cholmod` is set. What is missing is told in one sentence.
 
 use std::{env, fs, panic, path::PathBuf, process::Command};
 
@@ -54,6 +55,7 @@ const OTHER: &str = "set PETSC_DIR or PKG_CONFIG_PATH to another one";
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-check-cfg=cfg(petsc_without_mpi, petsc_without_cholmod)");
     for name in ["PETSC_DIR", "PETSC_ARCH", "PKG_CONFIG_PATH", "PKG_CONFIG"] {
         println!("cargo::rerun-if-env-changed={name}");
     }
@@ -69,15 +71,12 @@ fn find_and_declare() -> Result<(), String> {
     let mut words = petsc.map_err(|e| {
         format!("PETSc was not found ({e}); run `make deps` (Debian: petsc-dev), or {OTHER}")
     })?;
-    check_configuration(&words)?;
-
-    let compiler = pkg_config(&["--variable=ccompiler", "petsc"]).unwrap_or_default().join("");
-    let mpi =
-        words_of(&compiler, &["-show"], None).or_else(|_| words_of("mpicc", &["-show"], None));
-    let mpi = mpi.or_else(|e| known("mpi-c").or_else(|_| known("mpich")).map_err(|_| e));
-    words.extend(mpi.map_err(|e| {
-        format!("MPI was not found ({e}); run `make deps` (Debian: libopenmpi-dev)")
-    })?);
+    let without_mpi = check_configuration(&words)?;
+    if without_mpi {
+        println!("cargo::rustc-cfg=petsc_without_mpi");
+    } else {
+        words.extend(mpi()?);
+    }
     words.extend(known("CHOLMOD").unwrap_or_else(|_| system(&["cholmod"])));
     let lapack = known("lapack blas").or_else(|_| known("openblas"));
     words.extend(lapack.unwrap_or_else(|_| system(&["lapack", "blas"])));
@@ -124,8 +123,19 @@ fn find_and_declare() -> Result<(), String> {
     write("cholmod", &declare("cholmod", headers, &flags, CHOLMOD, variables)?)
 }
 
-/// One sentence if PETSc was built with numbers of other types. Runs on several processes use MUMPS and PTScotch.
-fn check_configuration(words: &[String]) -> Result<(), String> {
+/// The words by which the compiler that built PETSc finds MPI.
+fn mpi() -> Result<Vec<String>, String> {
+    let known = |package: &str| pkg_config(&["--cflags", "--libs", package]);
+    let compiler = pkg_config(&["--variable=ccompiler", "petsc"]).unwrap_or_default().join("");
+    words_of(&compiler, &["-show"], None)
+        .or_else(|_| words_of("mpicc", &["-show"], None))
+        .or_else(|e| known("mpi-c").or_else(|_| known("mpich")).map_err(|_| e))
+        .map_err(|e| format!("MPI was not found ({e}); run `make deps` (Debian: libopenmpi-dev)"))
+}
+
+/// Was PETSc built without MPI? One sentence if it was built with numbers of other types. Runs on several processes use MPI, MUMPS and
+/// PTScotch.
+fn check_configuration(words: &[String]) -> Result<bool, String> {
     let folders = words.iter().filter_map(|word| word.strip_prefix("-I"));
     let files = folders.map(|folder| PathBuf::from(folder).join("petscconf.h"));
     let (file, text) = files
@@ -139,10 +149,17 @@ fn check_configuration(words: &[String]) -> Result<(), String> {
         let needed = "needed is real double with 32-bit indices";
         return Err(format!("{file} has {name}; {needed}; {OTHER}"));
     }
+    if !has(&"PETSC_HAVE_SUITESPARSE") {
+        println!("cargo::rustc-cfg=petsc_without_cholmod");
+    }
+    if has(&"PETSC_HAVE_MPIUNI") {
+        println!("cargo::warning={file} is without MPI: runs will have one process");
+        return Ok(true);
+    }
     for name in ["PETSC_HAVE_MUMPS", "PETSC_HAVE_PTSCOTCH"].iter().filter(|name| !has(name)) {
         println!("cargo::warning={file} lacks {name}, which runs on several processes need");
     }
-    Ok(())
+    Ok(false)
 }
 
 /// The words that pkg-config prints. It looks in the folder of `PETSC_DIR` first.
@@ -174,7 +191,7 @@ fn words_of(program: &str, arguments: &[&str], path: Option<&str>) -> Result<Vec
     Ok(text(&output.stdout).split_whitespace().map(str::to_owned).collect())
 }
 
-/// Passes libraries and their folders to the linker. Programs find libraries at run time also in folders that are not the
+/// Passes libraries and their folders to the linker. Programs find shared libraries at run time also in folders that are not the
 /// system's (rpath). `DEP_PETSC_RPATH` names these folders to the build scripts of packages that use this one.
 fn link(words: &[String]) {
     words.iter().filter_map(|word| word.strip_prefix("-l")).for_each(|library| {
@@ -183,12 +200,23 @@ fn link(words: &[String]) {
     let mut own = Vec::new();
     for folder in words.iter().filter_map(|word| word.strip_prefix("-L")) {
         println!("cargo::rustc-link-search=native={folder}");
-        if !["/usr/lib", "/lib"].iter().any(|system| folder.starts_with(system)) {
+        let is_system = ["/usr/lib", "/lib"].iter().any(|system| folder.starts_with(system));
+        if !is_system && has_shared_libraries(folder) {
             println!("cargo::rustc-link-arg=-Wl,-rpath,{folder}");
             own.push(folder);
         }
     }
     println!("cargo::metadata=RPATH={}", own.join(":"));
+}
+
+/// Whether a folder has a library that is loaded at run time; a folder that cannot be read may have one.
+fn has_shared_libraries(folder: &str) -> bool {
+    let is_shared = |name: &str| name.ends_with(".so") || name.ends_with(".dylib");
+    let mut files = match fs::read_dir(folder) {
+        Ok(files) => files.flatten(),
+        Err(_) => return true,
+    };
+    files.any(|file| file.file_name().to_str().is_some_and(is_shared))
 }
 
 /// The Rust declarations of some C functions and variables.

@@ -27,8 +27,8 @@ Upstream-Name: signorini
 Files: *
 Copyright: 2026 The authors of signorini
 License: MIT or Apache-2.0
-Comment: The program contains CHOLMOD's supernodal part and is as a whole under the GPL, version 2 or later:
- /usr/share/common-licenses/GPL-2.
+Comment: The program contains CHOLMOD's supernodal part and crates under Apache-2.0 alone. It is as a whole under the GPL, version 3 or
+ later: /usr/share/common-licenses/GPL-3.
 
 License: Apache-2.0
  The text is in /usr/share/common-licenses/Apache-2.0.

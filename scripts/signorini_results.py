@@ -65,8 +65,8 @@ def run(scene, *options, out=None, **overrides):
 
     The scene is a path, an open file, or a dict with the tables of a scene; files that it names are beside it, those of a
     dict in the current folder. `options` are those of `signorini run`. Overrides are keys of the scene: `material={"young": 2e5}`, or with points
-    `**{"material.young": 2e5}`. The program is the variable SIGNORINI, `signorini` in the path, or that of the clone of this module. A
-    notebook shows the progress if tqdm is there.
+    `**{"material.young": 2e5}`. The program is the variable SIGNORINI; without it, `signorini` in the virtual environment of
+    this Python, in the path, or in the clone of this module. A notebook shows the progress if tqdm is there.
     """
     sets = [word for key, value in _keys(overrides) for word in ("--set", f"{key}={value}")]
     with _written(scene) as (path, name):
@@ -83,7 +83,9 @@ def run(scene, *options, out=None, **overrides):
 def _call(*arguments):
     """Calls the program."""
     clone = Path(__file__).resolve().parents[1]
-    places = [os.environ.get("SIGNORINI", "signorini"), str(clone / "target/release/signorini")]
+    own = [str(Path(sys.executable).with_name("signorini"))] * (sys.prefix != sys.base_prefix)
+    usual = [*own, "signorini", str(clone / "target/release/signorini")]
+    places = [os.environ["SIGNORINI"]] if "SIGNORINI" in os.environ else usual
     program = next(filter(None, map(shutil.which, places)), None)
     if program is None:
         raise RuntimeError("the program signorini was not found; put it into PATH, or set SIGNORINI to its path")

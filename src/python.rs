@@ -5,6 +5,7 @@ use std::{
     env,
     ffi::{OsStr, OsString},
     io::{self, Seek},
+    path::PathBuf,
     process::Command,
 };
 
@@ -47,13 +48,53 @@ const PROBE: &str = "import sys, importlib.util as util\n\
     lacks = [m for m in sys.argv[1:] if not util.find_spec(m)]\n\
     sys.exit(', '.join(lacks) or None)";
 
-/// The Python of the variable `PYTHON`; without it, the first usual one that has these modules. `tomllib` is part of Python
-/// from version 3.11 on.
+/// The folder of programs of the virtual environment into which pip has installed this program (venv writes `pyvenv.cfg`). `None`
+/// for a program in any other folder.
+fn environment() -> Option<PathBuf> {
+    let folder = env::current_exe().ok()?.parent()?.to_owned();
+    folder.parent()?.join("pyvenv.cfg").is_file().then_some(folder)
+}
+
+/// The file of the gmsh that runs: that of the virtual environment of this program, or the first one in `PATH`.
+pub(crate) fn gmsh() -> Option<PathBuf> {
+    let paths = env::var_os("PATH");
+    let folders = environment().into_iter().chain(paths.iter().flat_map(env::split_paths));
+    folders.map(|folder| folder.join("gmsh")).find(|program| program.is_file())
+}
+
+/// The command that runs this gmsh. The gmsh of pip is a script that names no particular Python, so that of the environment
+/// runs it. Its library needs libraries of windows, which a server may lack; it never uses them in a run without a window. The wheel
+/// of this program has stand-ins for them (scripts/wheel/stand_ins.sh).
+pub(crate) fn gmsh_command() -> Command {
+    let Some((folder, gmsh)) =
+        environment().zip(gmsh()).filter(|(folder, gmsh)| gmsh.starts_with(folder))
+    else {
+        return Command::new("gmsh");
+    };
+    let mut command = Command::new(folder.join("python3"));
+    let stand_ins = folder.with_file_name("lib").join("signorini");
+    if stand_ins.is_dir() {
+        // An empty part would be the current folder.
+        let others = env::var_os("LD_LIBRARY_PATH").filter(|others| !others.is_empty());
+        let mut all = stand_ins.into_os_string();
+        others.into_iter().for_each(|others| all.extend([OsStr::new(":"), &others]));
+        command.env("LD_LIBRARY_PATH", all);
+    }
+    command.args(ISOLATED).arg(gmsh);
+    command
+}
+
+/// The Python of the variable `PYTHON`; without it, the first usual one that has these modules: that of the virtual environment
+/// of this program, then those of the system. `tomllib` is part of Python from version 3.11 on.
 ///
 /// # Errors
 /// No Python has them. The message names the packages.
 pub fn python(modules: &[&str]) -> Result<OsString, String> {
-    let usual = || vec!["/usr/bin/python3".into(), "python3".into()];
+    let usual = || {
+        let own = environment().map(|folder| folder.join("python3"));
+        let system = ["/usr/bin/python3", "python3"].map(PathBuf::from);
+        own.into_iter().chain(system).map(PathBuf::into_os_string).collect()
+    };
     let candidates = env::var_os("PYTHON").map_or_else(usual, |python| vec![python]);
     let mut problems = Vec::new();
     for python in candidates {

@@ -2,7 +2,7 @@
 
 use super::words;
 use serde_json::{Value, json};
-use signorini::petsc;
+use signorini::petsc::{self, Communicator};
 use std::{env, fs, thread, time::SystemTime};
 
 /// `provenance` of `summary.json` of a run whose mesh this version of gmsh made. Unknown values are null.
@@ -35,15 +35,23 @@ fn commit() -> Option<&'static str> {
 /// The version of the program, its commit, and PETSc's version and file. They stay for the life of the process, as clap wants.
 pub fn version() -> &'static str {
     let commit = commit().unwrap_or("not recorded: it was built without make");
-    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| "its file is not known".into());
+    let unknown = if Communicator::HAS_MPI {
+        "its file is not known"
+    } else {
+        "within the program, without MPI"
+    };
+    let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| unknown.into());
     let [version, of_petsc] = [env!("CARGO_PKG_VERSION"), &petsc::version()];
     format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}").leak()
 }
 
-/// The names of the files of PETSc, of its factors and of BLAS; they end with their versions.
+/// The names of the files of PETSc, of its factors and of BLAS; they end with their versions. A PETSc without MPI is within the
+/// program, as in the wheel.
 fn libraries() -> Vec<String> {
     let files = loaded(&["libpetsc", "libcholmod", "libdmumps", "libopenblas", "libblas"]);
-    files.iter().filter_map(|file| file.rsplit('/').next()).map(str::to_owned).collect()
+    let within = (!Communicator::HAS_MPI).then(|| format!("petsc-{}", petsc::version()));
+    let names = files.iter().filter_map(|file| file.rsplit('/').next()).map(str::to_owned);
+    names.chain(within).collect()
 }
 
 /// The files of these libraries that this process has loaded, from Linux (proc(5), maps).

@@ -20,6 +20,10 @@ use std::{
 /// shared. Two pay from 100,000, four from 400,000 (SPEED.md, section 2).
 const UNKNOWNS: f64 = 25_000.0;
 
+/// The error for several ranks if PETSc was built without MPI.
+const WITHOUT_MPI: &str = "this program runs one process, because its PETSc was built without MPI; for several ranks, install the \
+                           Debian package or build the program (INSTALL.md)";
+
 /// The argument of `--ranks`.
 #[derive(Debug, Clone, Copy)]
 pub enum Ranks {
@@ -48,14 +52,20 @@ pub fn cores() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// The number of ranks that pay for this number of unknowns of the displacements, at most one per core.
+/// The number of ranks that pay for this number of unknowns of the displacements, at most one per core; one without MPI.
 pub fn paying(unknowns: usize) -> usize {
+    if !Communicator::HAS_MPI {
+        return 1;
+    }
     let ranks = (unknowns as f64 / UNKNOWNS).sqrt() as usize;
     ranks.clamp(1, cores())
 }
 
 /// Replaces this process by the same command on this number of `ranks`, without its argument `--ranks`.
 pub fn start(ranks: usize) -> Result<Infallible, Failure> {
+    if !Communicator::HAS_MPI {
+        return Err(Failure::input(format!("--ranks: {WITHOUT_MPI}")));
+    }
     let (mut passed, mut arguments) = (Vec::new(), words().into_iter().skip(1));
     while let Some(argument) = arguments.next() {
         if argument == "--" {
@@ -78,6 +88,9 @@ pub fn start(ranks: usize) -> Result<Infallible, Failure> {
 /// Checks that the ranks that a launcher started know each other.
 pub fn check_launcher(comm: Communicator) -> Result<(), Failure> {
     match Communicator::launched() {
+        Some(ranks) if ranks > 1 && !Communicator::HAS_MPI => {
+            Err(Failure::input(format!("{ranks} processes were started: {WITHOUT_MPI}")))
+        }
         Some(ranks) if ranks > 1 && comm.is_serial() => Err(Failure::input(format!(
             "{ranks} processes were started that do not know each other: this mpiexec belongs to another MPI than PETSc"
         ))),

@@ -22,6 +22,9 @@ pub struct Communicator {
 }
 
 impl Communicator {
+    /// False if PETSc was built without MPI. Then there is one rank.
+    pub const HAS_MPI: bool = cfg!(not(petsc_without_mpi));
+
     /// A single rank, which owns the whole body.
     pub fn serial() -> Self {
         Self { rank: 0, size: 1 }

@@ -27,9 +27,15 @@ mod session;
 mod stage;
 mod tao;
 mod vector;
+#[cfg(petsc_without_mpi)]
+#[allow(non_snake_case)]
+mod without_mpi;
 
 #[allow(warnings, clippy::all)]
 mod raw {
+    #[cfg(petsc_without_mpi)]
+    pub use super::without_mpi::*;
+
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }
 

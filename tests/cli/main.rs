@@ -10,6 +10,7 @@ mod check;
 mod compare;
 mod constants;
 mod doors;
+mod environment;
 mod export;
 mod extremes;
 mod failing;

@@ -108,8 +108,15 @@ impl LinearSolver {
             for (option, value) in options {
                 set_default_option(&format!("-{prefix}mat_{option}"), value)?;
             }
-            let kind = if serial || rows < VERY_LARGE { c"cholesky" } else { c"gamg" };
-            self.ksp.set_preconditioner(kind, if serial { c"cholmod" } else { c"mumps" })?;
+            // PETSc's own factor is much slower than CHOLMOD's: it is for those who ask for it.
+            let without_cholmod = serial && cfg!(petsc_without_cholmod);
+            let small = if serial { !without_cholmod || asked } else { rows < VERY_LARGE };
+            let package = match serial {
+                true if without_cholmod => c"petsc",
+                true => c"cholmod",
+                false => c"mumps",
+            };
+            self.ksp.set_preconditioner(if small { c"cholesky" } else { c"gamg" }, package)?;
         }
         self.ksp.set_from_options()?;
         let kind = self.ksp.kind()?;

@@ -5,7 +5,7 @@
 //! inputs, and gmsh is the same program or missing. A file is replaced only if the third digest is
 //! right: then this program wrote it, and nobody has changed it.
 
-use crate::whole_file;
+use crate::{python::gmsh, whole_file};
 use sha2::{Digest, Sha256};
 use std::{
     env,
@@ -127,9 +127,7 @@ pub fn origin(file: &[u8]) -> Option<[&str; 2]> {
 /// The digest of the path, the length and the time of the installed gmsh, if there is one. Asking it for its version
 /// would take as long as a small mesh.
 pub fn program() -> Option<String> {
-    let paths = env::var_os("PATH")?;
-    let program = env::split_paths(&paths).map(|folder| folder.join("gmsh")).find(|p| p.is_file());
-    let program = fs::canonicalize(program?).ok()?;
+    let program = fs::canonicalize(gmsh()?).ok()?;
     let data = fs::metadata(&program).ok()?;
     let identity = format!("{program:?} {} {:?}", data.len(), data.modified().ok()?);
     Some(digest(identity.as_bytes()))

@@ -3,6 +3,7 @@
 use crate::interrupt::{Interrupts, received};
 use crate::mesh::{MeshError, msh::is_complete};
 use crate::printable::print_error;
+use crate::python::gmsh_command;
 use std::{
     collections::HashSet,
     env,
@@ -11,7 +12,7 @@ use std::{
     io,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
-    process::{Child, Command, ExitStatus, Stdio},
+    process::{Child, ExitStatus, Stdio},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -65,7 +66,7 @@ pub fn run(
         squares.display()
     );
     fs::write(&second, last).map_err(MeshError::io(&second))?;
-    let mut command = Command::new("gmsh");
+    let mut command = gmsh_command();
     command.args(["-format", "msh41", "-v", "1"]).args(arguments).arg("-o").arg(&made);
     if is_script(input) {
         // Without "./" gmsh would take a path that begins with a dash for an option.

@@ -1,0 +1,74 @@
+//! The program in a virtual environment, where pip puts it: the Python and the gmsh are those of the environment.
+
+use crate::test_directory::{ProgramOutput, SCENE, TestDirectory};
+use std::{
+    fs::{self, Permissions},
+    os::unix::fs::PermissionsExt,
+    path::Path,
+    process::Command,
+};
+
+/// A program that writes its first path and its arguments into a file beside it, and the paths of libraries.
+const NOTES: &str = "#!/bin/sh\necho \"$LD_LIBRARY_PATH|$*\" >> \"$0.calls\"\nexit 1\n";
+
+/// The calls of the environment's Python by a program in `environment/bin`, in an environment with this file in its root.
+fn calls(mark: Option<&str>, arguments: &[&str]) -> String {
+    let directory = TestDirectory::new();
+    directory.write("square.geo", "// empty");
+    directory.write("scene.toml", &SCENE.replace("square.msh", "square.geo"));
+    directory.write("environment/lib/signorini/libX11.so.6", "");
+    for name in ["python3", "gmsh"] {
+        directory.write(&format!("environment/bin/{name}"), NOTES);
+        let file = directory.path(&format!("environment/bin/{name}"));
+        fs::set_permissions(file, Permissions::from_mode(0o755)).expect("mine");
+    }
+    let program = directory.path("environment/bin/signorini");
+    fs::copy(env!("CARGO_BIN_EXE_signorini"), &program).expect("room for the program");
+    mark.inspect(|name| directory.write(&format!("environment/{name}"), ""));
+    let mut command = Command::new(program);
+    command.args(arguments).current_dir(directory.path("")).env_remove("PYTHON");
+    command.env("PATH", "/usr/bin:/bin").env_remove("LD_LIBRARY_PATH");
+    ProgramOutput::of(&mut command);
+    let root = directory.path("environment").canonicalize().expect("it is there");
+    let said = fs::read_to_string(directory.path("environment/bin/python3.calls"));
+    assert!(!directory.path("environment/bin/gmsh.calls").exists());
+    said.unwrap_or_default().replace(&root.display().to_string(), "ENV")
+}
+
+#[test]
+fn a_program_in_a_virtual_environment_uses_its_python_and_its_gmsh() {
+    let meshed = calls(Some("pyvenv.cfg"), &["mesh", "scene.toml"]);
+    let start = "ENV/lib/signorini|-I -X utf8 ENV/bin/gmsh -format msh41 ";
+    assert!(meshed.starts_with(start), "{meshed}");
+    let plotted = calls(Some("pyvenv.cfg"), &["plot", "."]);
+    assert!(plotted.starts_with("|-I -X utf8 -c "), "{plotted}");
+}
+
+#[test]
+fn files_beside_a_program_elsewhere_are_not_executed() {
+    for arguments in [["mesh", "scene.toml"], ["plot", "."]] {
+        assert_eq!(calls(None, &arguments), "");
+    }
+}
+
+/// The wheel has the version of the program, through `pyproject.toml`, and all modules that Debian's package has.
+#[test]
+fn the_wheel_has_the_modules_of_the_package() {
+    let read = |file: &str| {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        fs::read_to_string(file).expect("a file of the repository")
+    };
+    let wheel = read("scripts/wheel/wheel.py");
+    assert!(wheel.contains("project['version']"));
+    let all = read("Cargo.toml");
+    let modules = all
+        .split("\"scripts/")
+        .skip(1)
+        .filter_map(|rest| rest.split_once(".py\""))
+        .map(|(name, _)| name);
+    let modules: Vec<_> = modules.collect();
+    assert_eq!(modules.len(), 3);
+    for module in modules {
+        assert!(wheel.contains(&format!("\"{module}\"")), "{module}");
+    }
+}
