@@ -341,7 +341,9 @@ fn runs_have_colours_and_supports_styles() {
 #[test]
 fn a_flat_foundation_stays_at_its_place_under_a_magnified_body() {
     let directory = TestDirectory::new();
-    let scene = directory.read("scene.toml").replace("symmetry = true", "displacement = ['0.01*t', 'free']");
+    let scene = directory
+        .read("scene.toml")
+        .replace("symmetry = true", "displacement = ['0.01*t', 'free']");
     directory.write("scene.toml", &scene);
     directory.run(&["--set", "damage.lambda_u=0"]);
     let draws = "import numpy as np\n\

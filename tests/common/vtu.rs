@@ -24,7 +24,11 @@ fn values(array: Node) -> Vec<f64> {
     assert_eq!(array.attribute("format"), Some("binary"), "{array:?}");
     let bytes = STANDARD.decode(array.text().expect("data").trim()).expect("base64");
     let (size, data) = bytes.split_at(8);
-    assert_eq!(u64::from_le_bytes(size.try_into().expect("eight bytes")), data.len() as u64, "{array:?}");
+    assert_eq!(
+        u64::from_le_bytes(size.try_into().expect("eight bytes")),
+        data.len() as u64,
+        "{array:?}"
+    );
     macro_rules! numbers {
         ($kind:ty) => {{
             let (numbers, rest) = data.as_chunks();
@@ -46,7 +50,9 @@ fn values(array: Node) -> Vec<f64> {
 fn arrays(piece: Node, section: &str) -> Vec<(String, Vec<f64>)> {
     let section = piece.children().find(|node| node.has_tag_name(section));
     let arrays = section.into_iter().flat_map(|node| node.children()).filter(Node::is_element);
-    arrays.map(|array| (array.attribute("Name").expect("a name").to_owned(), values(array))).collect()
+    arrays
+        .map(|array| (array.attribute("Name").expect("a name").to_owned(), values(array)))
+        .collect()
 }
 
 pub fn frame(path: &Path) -> Frame {
