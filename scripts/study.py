@@ -225,8 +225,8 @@ def problem_of(arguments, command):
     if arguments.jobs < 1:
         return "--jobs must be at least 1"
     scene = arguments.scene
-    if scene.startswith(("/dev/", "/proc/")) or os.path.exists(scene) and not os.path.isfile(scene):
-        return f"{scene} is no regular file, and each run reads the scene again; save it in a file"
+    if scene.startswith(("/dev/", "/proc/")) or os.path.exists(scene) and not (os.path.isfile(scene) or os.path.isdir(scene)):
+        return f"{scene}: it is a pipe or a device, and each run reads the scene again; save it in a file"
     cut = command.index("--") if "--" in command else len(command)
     asked = [os.environ["SIGNORINI"], *command[:cut], "--help"]
     tried = subprocess.run(asked, stdin=subprocess.DEVNULL, capture_output=True, text=True)

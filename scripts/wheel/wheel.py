@@ -45,7 +45,8 @@ def glibc(files):
 
 
 def pack(program, stand_ins, licenses, gmsh, out):
-    project = tomllib.loads((HERE / "pyproject.toml").read_text())["project"]
+    setup = tomllib.loads((HERE / "pyproject.toml").read_text())
+    project = setup["project"]
     name = f"signorini-{project['version']}"
     needed = [f"gmsh=={gmsh}", *project["dependencies"]]
     extras = [f'{package}; extra == "{extra}"' for extra, all in project["optional-dependencies"].items() for package in all]
@@ -64,7 +65,7 @@ def pack(program, stand_ins, licenses, gmsh, out):
             made.mkdir(parents=True)
         shutil.copy(program, data / "scripts/signorini")
         shutil.copytree(stand_ins, data / "data/lib/signorini")
-        for module in ["signorini_files", "signorini_results", "signorini_summaries"]:
+        for module in setup["tool"]["setuptools"]["py-modules"]:
             shutil.copy(HERE / f"{module}.py", root)
         shutil.copytree(licenses, info / "licenses")
         for file in HERE.parent.glob("LICENSE-*"):

@@ -59,16 +59,11 @@ fn the_wheel_has_the_modules_of_the_package() {
         fs::read_to_string(file).expect("a file of the repository")
     };
     let wheel = read("scripts/wheel/wheel.py");
-    assert!(wheel.contains("project['version']"));
+    assert!(wheel.contains("project['version']") && wheel.contains("[\"py-modules\"]"));
     let all = read("Cargo.toml");
-    let modules = all
-        .split("\"scripts/")
-        .skip(1)
-        .filter_map(|rest| rest.split_once(".py\""))
-        .map(|(name, _)| name);
-    let modules: Vec<_> = modules.collect();
-    assert_eq!(modules.len(), 3);
-    for module in modules {
-        assert!(wheel.contains(&format!("\"{module}\"")), "{module}");
-    }
+    let packaged = all.split("\"scripts/").skip(1).filter_map(|rest| rest.split_once(".py\""));
+    let packaged: Vec<_> = packaged.map(|(name, _)| name.into()).collect();
+    let project: toml::Value = toml::from_str(&read("scripts/pyproject.toml")).expect("TOML");
+    let modules = project["tool"]["setuptools"]["py-modules"].as_array().expect("a list");
+    assert_eq!(*modules, packaged, "the Debian package and the wheel have the same modules");
 }
