@@ -122,9 +122,9 @@ wheel:
 	PETSC_DIR=$(CURDIR)/$(WHEEL)/petsc PETSC_ARCH=static PKG_CONFIG_PATH=$(CURDIR)/$(WHEEL)/lib/pkgconfig \
 	    cargo build --release --locked --bin signorini --target-dir $(WHEEL)/cargo
 	strip -o $(WHEEL)/signorini $(WHEEL)/cargo/release/signorini
-	$(WHEEL)/tools/bin/pip install --quiet --no-deps --target $(WHEEL)/gmsh --upgrade gmsh==$(GMSH_WHEEL)
+	$(WHEEL)/tools/bin/pip install --quiet --no-deps gmsh==$(GMSH_WHEEL)
 	rm -rf $(WHEEL)/stand_ins target/wheels && mkdir $(WHEEL)/stand_ins
-	scripts/wheel/stand_ins.sh $(WHEEL)/gmsh/lib/libgmsh.so* $(WHEEL)/stand_ins
+	scripts/wheel/stand_ins.sh $(WHEEL)/tools/lib/libgmsh.so* $(WHEEL)/stand_ins
 	$(WHEEL)/tools/bin/python scripts/wheel/wheel.py $(WHEEL)/signorini $(WHEEL)/stand_ins $(WHEEL)/licenses $(GMSH_WHEEL) target/wheels
 	$(WHEEL)/tools/bin/auditwheel show target/wheels/*.whl
 	scripts/wheel/check.sh target/wheels/*.whl

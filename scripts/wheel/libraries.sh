@@ -20,12 +20,9 @@ done
 cat >stand_ins.c <<'END'
 int METIS_NodeND(void) { return -4; /* METIS_ERROR */ }
 int METIS_ComputeVertexSeparator(void) { return -4; }
-/* The hypot of glibc 2.35 differs from that of older ones in errno alone. */
-__asm__(".symver old_hypot, hypot@GLIBC_2.2.5");
-double old_hypot(double, double);
-double hypot(double x, double y) { return old_hypot(x, y); }
 END
-gcc -O2 -fPIC -fno-builtin -c stand_ins.c
+gcc -O2 -fPIC -c stand_ins.c
+rm -f "$folder/lib/libstand_ins.a"
 ar rcs "$folder/lib/libstand_ins.a" stand_ins.o
 # package NAME LIBRARIES, for pkg-config.
 package() {
