@@ -51,22 +51,31 @@ class View {
     this.along = along;
     contact.hidden = !run.curves.length;
     const tall = run.box[1][1] - run.box[0][1];
+    this.titles = [];
     this.contact = run.curves.map((curve, part) => {
       const place = contact.appendChild(document.createElement("div")), highest = run.topPressure / run.units.stress.factor;
-      place.append(Object.assign(document.createElement("p"), { textContent: curve.title }));
+      this.titles.push(place.appendChild(document.createElement("p")));
       return new Chart(place, `arc length (${run.units.length.name})`,
         [`pressure (${run.units.stress.name})`, `gap (${run.units.length.name})`],
         [[0, 1.08 * highest || 1], [Math.min(0, run.leastGap), run.largestGap > 1e-9 * tall ? 1.08 * run.largestGap : tall]]);
     });
   }
 
+  // The name of a part of Γ_C, and the largest pressure if the axis leaves it out.
+  titleOf(part) {
+    const { run, frame } = this, largest = run.frames[frame].contact[part].pressure.reduce((a, b) => Math.max(a, b), 0);
+    const { name, factor } = run.units.stress, isClipped = largest > 1.08 * run.topPressure;
+    return run.curves[part].title + (isClipped ? `; clipped: the pressure goes up to ${short(largest / factor)} ${name}` : "");
+  }
+
   listen() {
     const { root, canvas } = this;
-    root.addEventListener("input", event => {
+    const changed = event => {
       if (event.target.name === "frame") { this.stop(); return this.show(Number(event.target.value)); }
       if (["low", "high"].includes(event.target.name)) this.control("range").value = "hand";
       this.show(this.frame);
-    });
+    };
+    for (const kind of ["input", "change"]) root.addEventListener(kind, changed);
     const actions = {
       play: () => this.timer ? this.stop() : this.play(), fit: () => { this.fit(); this.draw(); },
       auto: () => { this.control("factor").value = this.run.automatic; this.show(this.frame); },
@@ -124,10 +133,17 @@ class View {
   }
 
   fit() {
-    const { clientWidth, clientHeight } = this.canvas.parentElement, [[left, bottom], [right, top]] = this.run.box;
+    const { clientWidth, clientHeight } = this.canvas.parentElement, [[left, bottom], [right, top]] = this.box();
     Object.assign(this, { width: clientWidth, height: clientHeight, centre: [(left + right) / 2, (bottom + top) / 2] });
     this.zoom = Math.max(Math.min((clientWidth - 240) / (right - left || 1), (clientHeight - 120) / (top - bottom || 1)), 1e-12);
     this.centre[0] += 30 / this.zoom;
+  }
+
+  // Corners around the body as it is shown, and around those of `run`, which contain the foundation, for a usual factor.
+  box() {
+    const { low, high } = this.locator(), [[left, bottom], [right, top]] = this.run.box;
+    if (this.factor > this.run.automatic) return [low, high];
+    return [[Math.min(left, low[0]), Math.min(bottom, low[1])], [Math.max(right, high[0]), Math.max(top, high[1])]];
   }
 
   zoomBy(by, [x, y]) {
@@ -153,6 +169,7 @@ class View {
     this.body.colour(this.shown);
     this.range = this.chosenRange();
     this.contact.forEach((chart, part) => chart.show(contactData(this.run, frame, part)));
+    this.titles.forEach((title, part) => { title.textContent = this.titleOf(part); });
     this.showLine();
     this.draw();
     if (this.pointed) this.tell(this.pointed);
@@ -166,8 +183,8 @@ class View {
     if (!this.ranges.has(key)) this.ranges.set(key, run.range(field, all, material));
     const found = { ...this.ranges.get(key) };
     if (kind !== "hand") return this.written(found);
-    const [low, high] = ["low", "high"].map(name => Number(this.control(name).value) * factor);
-    return { ...found, low, high };
+    const [low, high] = ["low", "high"].map(name => this.control(name).valueAsNumber * factor);
+    return Number.isFinite(high - low) && low < high ? { ...found, low, high } : found;
   }
 
   // Writes the range into its fields, from which one goes on by hand.
@@ -209,11 +226,13 @@ class View {
   said(spot) {
     const { run, unit } = this, at = [run.x, run.y].map((of, axis) => run.interpolate(of, spot) + run.origin[axis]);
     const value = run.interpolate(this.shown, spot) / unit.factor, name = run.materialNames[run.materials[spot.element]];
-    // Stresses have five digits of the largest one.
+    // Places have six digits of the body's size, stresses five of the largest one.
+    const size = Math.max(...run.box[1].map((high, axis) => high - run.box[0][axis]));
+    const decimals = Math.min(Math.max(5 - Math.floor(Math.log10(size)), 0), 100);
     const noise = unit.isStress ? 1e-7 * run.stressTop / unit.factor : 0;
     const digits = (x, least = 0) => Math.abs(x) < least ? "0" : String(Number(x.toPrecision(6)));
     const material = run.materialNames.length > 1 ? `, ${name}` : "";
-    return `(${at.map(x => digits(x)).join(", ")}) ${run.units.length.name}: ${unit.label} ${digits(value, noise)} ${unit.name}${material}${this.contactAt(spot)}`;
+    return `(${at.map(x => Number(x.toFixed(decimals))).join(", ")}) ${run.units.length.name}: ${unit.label} ${digits(value, noise)} ${unit.name}${material}${this.contactAt(spot)}`;
   }
 
   // Pressure and gap at the nearest node of Γ_C, if that is a node of the element.
@@ -266,9 +285,11 @@ class View {
     this.line.show(this.lineData());
   }
 
+  // The numbers are in the units of the scene, as in all other files.
   saveLine() {
-    const [distances, values] = this.lineData(), { origin } = this.run;
-    const rows = this.cut.map(({ at }, k) => [distances[k], ...at.map((x, axis) => x + origin[axis]), values[k] ?? ""].join(","));
+    const [distances, shown] = this.lineData(), { origin } = this.run, { factor } = this.unit;
+    const values = shown.map(value => value === null ? "" : value * factor);
+    const rows = this.cut.map(({ at }, k) => [distances[k], ...at.map((x, axis) => x + origin[axis]), values[k]].join(","));
     saved(`${this.run.name}-line.csv`, new Blob([["distance,x,y," + this.field, ...rows, ""].join("\n")], { type: "text/csv" }));
   }
 
