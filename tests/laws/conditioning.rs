@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 const PRESSED: &str = "
     { name = 'left', displacement = [0, 0] },
     { name = 'bottom', gap = 0 },
-    { name = 'top', traction = [0, '-15 + 25*max(-1, min(1, 1e6*(x - 0.5)))'] },";
+    { name = 'top', traction = [0, '-1.5 + 2.5*max(-1, min(1, 1e6*(x - 0.5)))'] },";
 
 /// A body with Young's modulus 80 of the material `law`.
 fn body(mesh: Mesh, law: &str, more: &str, boundaries: &str) -> ObservedProblem {
