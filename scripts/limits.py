@@ -6,9 +6,12 @@ import numpy as np
 
 from results import amplification
 from setting import largest_load, near
+from signorini_results import PEAK, PEAK_PART
 
+# A singular stress is a peak if it is so many times the others.
+SINGULAR_PEAK = 1.25
 # A singular pressure is a peak within this part of its boundary; pressures below this part of it are no contact.
-PEAK, LEAST_REST = 0.02, 1e-3
+NEAR, LEAST_REST = 0.02, 1e-3
 
 
 @dataclass
@@ -38,12 +41,12 @@ def _exceeded_in(part, values, sizes):
 
 def stress_top(state, stress):
     """The top of the colours for a stress at the nodes: the largest, or if that is a peak, the stress that is exceeded
-    on 0.5 % of the area. Singular stresses are peaks, and so are those above four times this."""
+    beside it. Singular stresses are peaks sooner."""
     (ax, ay), (bx, by), (cx, cy) = (state.nodes[state.pieces.elements[:, i]].T for i in range(3))
     areas = np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) * state.shown
     means = stress[state.pieces.elements[:, :3]].mean(axis=1)
-    top, largest = _exceeded_in(0.005, means, areas), stress.max()
-    return top if largest > (1.25 if state.singular() else 4.0) * top > 0.0 else largest
+    top, largest = _exceeded_in(PEAK_PART, means, areas), stress.max()
+    return top if largest > (SINGULAR_PEAK if state.singular() else PEAK) * top > 0.0 else largest
 
 
 def _pressure_top(state):
@@ -58,7 +61,7 @@ def _pressure_top(state):
     # Without other pressures the peak is the contact.
     regular = regular if regular.max() > LEAST_REST * pressure.max() else pressure
     largest, top = regular.max(), _exceeded_in(0.01, regular, lengths)
-    return top if largest > 4.0 * top > 0.0 else largest
+    return top if largest > PEAK * top > 0.0 else largest
 
 
 def is_near_peak(figure, points):
@@ -67,7 +70,7 @@ def is_near_peak(figure, points):
         return np.full(len(points), False)
     peaks = np.array([points[0], points[-1], figure["at"] or points[0]])
     distances = np.linalg.norm(points[:, None] - peaks, axis=2).min(axis=1)
-    return distances <= PEAK * np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+    return distances <= NEAR * np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
 
 
 def limits_of(states, factor=None):

@@ -140,7 +140,8 @@ def viewer(results, everything, limits):
     """The element of the viewer, and its data and scripts."""
     left_out = len(results.frames) - len(everything)
     note = f"{len(everything)} of {len(results.frames)} frames are here; fields.pvd has all." if left_out else ""
-    own = "".join(page_file(name) for name in SCRIPTS)
+    inks = "".join(f"const {name} = '{getattr(drawing, name)}';\n" for name in ("INK", "BLUE", "RED"))
+    own = inks + "".join(page_file(name) for name in SCRIPTS)
     scripts = [f"<script>{page_file('libraries.js')}</script>", elements_of(results, everything, limits),
                f'<script>(() => {{ "use strict";\n{own}}})();</script>']
     return Template(page_file("viewer.html")).substitute(left_out=note), "\n".join(scripts)

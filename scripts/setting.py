@@ -36,7 +36,7 @@ def draw_setting(results, _limits, figure=None):
     Clamps are hatched. Rollers mark boundaries with one prescribed component, and axes of symmetry. The legend
     lists the conditions with the values of the scene. None if the folder lacks the scene.
     """
-    conditions, curves = _conditions(results), _curves(results)
+    conditions, curves = _conditions(results), curves_of(results)
     if not conditions or not curves:
         return None
     start = states(results, results.frames[:1])[0]
@@ -117,7 +117,7 @@ def _conditions(results):
     return {of["name"]: of for of in results.scene.get("boundary", [])}
 
 
-def _curves(results):
+def curves_of(results):
     """The connected parts of boundaries: names and polylines."""
     return [(name, np.array(path)) for name, edges in results.summary.get("boundaries", {}).items()
             for path in paths([tuple(map(tuple, edge)) for edge in edges])]
@@ -152,12 +152,12 @@ def _loads(results, curves):
 
 def largest_load(results):
     """The largest traction of a state, N/m²."""
-    return _largest(_tractions(results, _curves(results), results.time))
+    return _largest(_tractions(results, curves_of(results), results.time))
 
 
 def draw_loads(axes, results, largest, factor):
     """The tractions of a state on the deformed body, as arrows; `largest` has the longest."""
-    curves = _curves(results) if largest else []
+    curves = curves_of(results) if largest else []
     for (_, line), force in zip(curves, _tractions(results, curves, results.time)):
         moved = line + factor * results.displacement_at(line)
         _draw_traction(axes, line, force * ARROW * results.size / largest, results.size, moved)
@@ -166,7 +166,7 @@ def draw_loads(axes, results, largest, factor):
 def loads_of(results):
     """The tractions of a state along each loaded boundary: points of the undeformed body, their displacements, the
     tractions there, (n, 2) each, and which of them press."""
-    curves = _curves(results)
+    curves = curves_of(results)
     for (_, line), force in zip(curves, _tractions(results, curves, results.time)):
         if force.any():
             points, normals = _samples(line, SPACING * results.size)
@@ -177,11 +177,6 @@ def loads_of(results):
 def boundary_colours(results):
     """The colours of the boundaries with conditions, by name."""
     return {name: _colour(of) for name, of in _conditions(results).items()}
-
-
-def paths_of_boundaries(results):
-    """The connected parts of boundaries: names and polylines."""
-    return _curves(results)
 
 
 def _vectors(expressions, points, time, folder):

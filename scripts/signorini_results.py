@@ -49,6 +49,8 @@ COMPONENTS = {
 STRAINS = {"strain_xx": (0, 0), "strain_yy": (1, 1), "strain_xy": (0, 1)}
 # The end of a frame for gmsh.
 WRITTEN = b"$Comments\nA frame of signorini.\n$EndComments\n"
+# The colours of a picture leave out a peak: values on this part of the area, if the largest one is so many times the others.
+PEAK_PART, PEAK = 0.005, 4.0
 # A point is in a triangle if its barycentric coordinates are not smaller.
 OUTSIDE = -1e-9
 # The largest number of pairs of points and triangles that are tried at once.
@@ -379,8 +381,8 @@ def _top(frame, values):
     a, b, c = (frame.points[corners[:, k]] for k in range(3))
     means, areas = values[corners].mean(axis=1), _cross(b - a, c - a)
     order = means.argsort()
-    top = means[order[np.searchsorted(areas[order].cumsum(), 0.995 * areas.sum())]]
-    return top if values.max() > 4.0 * top > 0.0 else values.max()
+    top = means[order[np.searchsorted(areas[order].cumsum(), (1.0 - PEAK_PART) * areas.sum())]]
+    return top if values.max() > PEAK * top > 0.0 else values.max()
 
 
 def _ends(points):

@@ -8,10 +8,11 @@ import matplotlib
 import numpy as np
 
 from drawing import stress_unit
+from limits import SINGULAR_PEAK
 from reading import evenly, states
 from results import ROUNDING
-from setting import boundary_colours, loads_of, paths_of_boundaries
-from signorini_results import paths
+from setting import boundary_colours, curves_of, loads_of
+from signorini_results import PEAK, PEAK_PART, paths
 
 # The largest size of all frames in the page, bytes.
 LARGEST = 24_000_000
@@ -85,7 +86,7 @@ def about(results, everything, limits, origin):
         "name": results.folder.resolve().name,
         "count": len(results.nodes), "size": len(results.pieces.elements), "order": results.pieces.elements.shape[1],
         "origin": origin.tolist(), "box": (limits.box - origin).tolist(), "automatic": limits.factor,
-        "materialNames": results.material_names if results.materials is not None else ["material"],
+        "materialNames": [results.surface(name) for name in results.material_names] if results.materials is not None else ["body"],
         "fields": {key: dict(zip(("label", "kind", "colours"), of)) for key, of in FIELDS.items()
                    if is_damaged or key not in ("damage", "zeta")},
         "units": {"stress": {"name": unit, "factor": factor}, "length": {"name": units["length"], "factor": 1},
@@ -94,14 +95,14 @@ def about(results, everything, limits, origin):
                     for name in ("viridis", "magma")},
         "outline": paths([pair for edge in along(results.pieces.boundary()) for pair in edge]),
         "boundaries": [{"name": name, "colour": colours[name], "nodes": [number[tuple(point)] for point in path.tolist()]}
-                       for name, path in paths_of_boundaries(results) if name in colours],
+                       for name, path in curves_of(results) if name in colours],
         "curves": [curve_of(curve, number, units) for curve in results.curves],
         "singular": singular(results, number),
+        "peak": {"part": PEAK_PART, "factor": PEAK, "singular": SINGULAR_PEAK},
         "topPressure": limits.pressure if results.curves else 0, "stressTop": limits.stress, "largestLoad": limits.load,
         "leastGap": float(gaps.min()), "largestGap": float(gaps.max()),
         "frames": [{"moment": state.moment, "loads": loads(state, origin), "foundation": foundation(state, origin, limits.factor)}
                    for state in everything],
-        "left_out": len(results.frames) - len(everything),
     }
 
 

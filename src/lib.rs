@@ -93,7 +93,7 @@ pub mod interrupt;
 pub mod memory;
 pub mod printable;
 pub mod python;
-mod suggestion;
+pub mod suggestion;
 mod whole_file;
 pub mod petsc;
 pub mod linear;

@@ -12,6 +12,7 @@ use signorini::{
     output::terminal::{keep, lost},
     petsc::Allocator,
     printable::printable,
+    suggestion::most_similar,
 };
 use std::{ffi::OsString, path::PathBuf, process::ExitCode};
 
@@ -128,11 +129,9 @@ fn words() -> Vec<OsString> {
 fn suggest(error: &mut clap::Error) {
     if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand) {
         let (program, word) = (Arguments::command(), word.clone());
-        let likeness = |name: &&str| strsim::normalized_damerau_levenshtein(&word, name);
         let names = program.get_subcommands().map(clap::Command::get_name);
-        let near = names.filter(|name| likeness(name) >= 0.5);
-        let near = near.max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-        let near = near.map(|name| ContextValue::Strings(vec![name.to_owned()]));
+        let near =
+            most_similar(&word, names).map(|name| ContextValue::Strings(vec![name.to_owned()]));
         near.map(|near| error.insert(ContextKind::SuggestedSubcommand, near));
     }
 }

@@ -106,11 +106,12 @@ class Run {
     }));
   }
 
-  // The ends of the colours for a field in these frames, and its extremes there. A peak on 0.5 % of the area must not
+  // The ends of the colours for a field in these frames, and its extremes there. A peak on a small part of the area must not
   // darken the rest: the colours leave it out if it is `peak` times as far away as the others.
   range(field, frames, material) {
     const chosen = this.samples.get(material), of = FIELDS[field], n = this.order;
-    const peak = this.singular.length && field !== "damage" && field !== "zeta" ? 1.25 : 4;
+    const { part, factor, singular } = this.peak;
+    const peak = this.singular.length && this.fields[field].kind === "stress" ? singular : factor;
     const found = { low: Infinity, high: -Infinity, least: Infinity, largest: -Infinity };
     for (const frame of frames) {
       const { columns } = this.frames[frame];
@@ -120,8 +121,8 @@ class Run {
         return sum / 3;
       }).sort();
       const quantile = part => means[Math.floor(part * (means.length - 1))];
-      found.low = Math.min(found.low, quantile(0.005));
-      found.high = Math.max(found.high, quantile(0.995));
+      found.low = Math.min(found.low, quantile(part));
+      found.high = Math.max(found.high, quantile(1 - part));
       const { least, largest } = this.extremes(field, frame, material);
       found.least = Math.min(found.least, least.value);
       found.largest = Math.max(found.largest, largest.value);

@@ -7,7 +7,6 @@ const SVG = {
     `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" ${style}>${SVG.escaped(words)}</text>`,
   escaped: words => String(words).replace(/[&<>"]/g, letter => `&#${letter.charCodeAt(0)};`),
 };
-const INK = "#22262b", BLUE = "#2f6db3", RED = "#c0392b", FAINT = "#9aa3ad";
 const OPEN_END = 12; // pixels of the arrow ends of the colour bar
 
 // A number with four digits, or fewer if the last ones are below a millionth of `scale`.
@@ -73,7 +72,7 @@ class Overlay {
     }).join("");
   }
 
-  // The foundation is linear in the factor of displacements.
+  // The foundation, as pictures show it at the factor 1 and at the automatic one; between them it is linear.
   foundation(view) {
     if (!view.foundation) return "";
     return this.run.frames[view.frame].foundation.map(({ at, by }) => {

@@ -48,8 +48,8 @@ def browser():
     return webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
 
 
-def value_at(page, view, mesh, x, y):
-    """What the page says of a point of the undeformed body, and the place that it names."""
+def value_at(page, view, x, y):
+    """What the page says of a point of the undeformed body."""
     page.execute_script(SET, "factor", "0")
     origin = view["origin"]
     pixel = page.execute_script("return document.getElementById('viewer').view.screen(arguments[0])",
@@ -127,7 +127,7 @@ def main(folder):
                     # A point of a random element, on a whole pixel or not.
                     corners = mesh.points[random.choice(mesh.cells[0].data)[:3], :2]
                     x, y = random.dirichlet((2.0, 2.0, 2.0)) @ corners
-                    said = value_at(page, view, mesh, x, y)
+                    said = value_at(page, view, x, y)
                     exact, largest = expected(mesh, field, x, y)
                     if not said:
                         print(f"{field} at ({x}, {y}): the page says nothing")
