@@ -185,6 +185,9 @@ def draw(results, limits, arguments):
         tell(write_script(results, limits_of(chosen, arguments.factor)))
         return
     last = replace(results, time=results.frames[-1][0])
+    if OPTIONS.zoom and ((limits.box[1] < OPTIONS.zoom[0]) | (limits.box[0] > OPTIONS.zoom[1])).any():
+        (x0, y0), (x1, y1) = limits.box.tolist()
+        raise ResultError(f"--zoom: the maps show nothing there; they are within {x0:g},{y0:g},{x1:g},{y1:g}")
     if arguments.times:
         chosen = states(results, [results.frames[k] for k in dict.fromkeys(
             nearest(results.frames, time) for time in arguments.times)])
@@ -248,8 +251,9 @@ def main(prog=None):
             runs.append(read_without_fields(folder, arguments.time) if arguments.together else
                         read_results(folder, arguments.time, arguments.material))
             last = runs[-1].frames[-1][0]
-            if arguments.time is not None and arguments.time > last:
-                print(f"{folder}: the last frame is at t = {last:g}, before {arguments.time:g}: it is drawn",
+            asked = max([*filter(None, [arguments.time]), *(arguments.times or [])], default=last)
+            if asked > last:
+                print(f"{folder}: the last frame is at t = {last:g}, before {asked:g}: it is drawn",
                       file=sys.stderr)
         failed |= bool(problems)
     if arguments.together and runs:

@@ -368,6 +368,9 @@ fn maps_of_a_part_and_of_several_times_are_drawn_and_removed() {
     assert_eq!(said.out, "out/scene/times.png\n");
     let said = directory.say(&["plot", "out/scene", "--zoom", "1,0,0,1"]);
     assert!(said.code == Some(2) && said.err.contains("X0 < X1"), "{said:?}");
+    directory
+        .say(&["plot", "out/scene", "--zoom", "10,10,12,12"])
+        .fails(2, &["--zoom: the maps show nothing there; they are within"]);
     directory.say(&["plot", "out/scene", "--along", "bottom,top", "--quantity", "stress_yy"]);
     let rows = directory.read("out/scene/curves_along_bottom,top_stress_yy.csv");
     assert!(rows.starts_with("run,boundary,time,s,stress_yy"), "{rows}");
