@@ -6,7 +6,7 @@
 #   STEPS=…             what to do after the build, of: scenes test validate container (all, if it is not set)
 #   CHROOTS=…           the folder of the bare systems (debootstrap), of the logs, and of the rows of the table
 # The toolchain and the crates are this machine's: run `make mesh && make run` first. The figures of the scenes are
-# compared with this machine's. The table goes into README.md; a system that does not run now keeps its row.
+# compared with this machine's. The table goes into INSTALL.md; a system that does not run now keeps its row.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -139,10 +139,10 @@ all=(bookworm trixie sid noble resolute)
 [ $# -gt 0 ] || set -- "${all[@]}"
 for system; do run_system; done
 {
-    sed '/^<!-- systems/q' README.md
+    sed '/^<!-- systems/q' INSTALL.md
     echo '| system | gmsh, Open MPI, PETSc | packages | build | nine scenes | difference on the same meshes | on its own' \
         'meshes | `make test` | `make validate` | Containerfile | date |'
     echo '|---|---|---|---|---|---|---|---|---|---|---|'
     for system in "${all[@]}"; do cat "$CHROOTS/$system.row" 2>/dev/null || true; done
-    sed -n '/^<!-- end of systems/,$p' README.md
-} >README.md.new && mv README.md.new README.md
+    sed -n '/^<!-- end of systems/,$p' INSTALL.md
+} >INSTALL.md.new && mv INSTALL.md.new INSTALL.md
