@@ -19,7 +19,7 @@ peers    the same work in NGSolve, scikit-fem, GetFEM, and numpy with CHOLMOD (p
 k = 0.01. A step is the mean of all but the first, which makes what the others keep. Programs take turns,
 because the machine may be shared: a row has the medians over the rounds, ratios are taken round by round.
 All use the same meshes, tolerance and one thread each. A program whose answer differs from ours by more than 1e-6
-is left out. Writes OUT/bench.csv and prints the tables of SPEED.md.
+is left out. Writes OUT/bench.csv and prints the tables behind validation/SPEED.md.
 """
 
 import argparse
@@ -344,7 +344,7 @@ def exponent(rows, key):
 
 
 def report(rows):
-    """Prints the tables of SPEED.md."""
+    """Prints the tables behind validation/SPEED.md."""
     cases = {}
     for row in rows:
         if row["part"] == "compare":

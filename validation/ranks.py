@@ -3,7 +3,7 @@
 
 The counts do not depend on the machine, so the ranks may share a few cores. `messages.c` counts the calls of MPI. A step is the
 difference of two runs with 6 and 12 steps of `square-mild` on the same mesh; each factor is made in both. Prints a table of
-Markdown for SPEED.md: with our factors, MUMPS and gamg.
+Markdown behind validation/SPEED.md: with our factors, MUMPS and gamg.
 
     ranks.py [--binary PATH] [--n 256] [--ranks 2 4 8 16 32 64] [--factors ours MUMPS gamg]
 """

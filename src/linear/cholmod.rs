@@ -18,7 +18,7 @@ const FREED: usize = 1 << 22;
 
 impl Cholmod {
     /// Orders `a` by minimum degree, with the last `interface` rows at the end (cholmod_l_camd), and analyses it
-    /// (cholmod_l_analyze_p). Nested dissection saves less time on triangle meshes than it takes (SPEED.md, section 2).
+    /// (cholmod_l_analyze_p). Nested dissection saves less time on triangle meshes than it takes (SPEED.md, section 1).
     pub(super) fn ordered(a: &mut LowerTriangle, interface: usize) -> Result<Self, PetscError> {
         let (mut this, size, mut view, none) = (Self::start(), a.size(), a.view(), ptr::null_mut());
         let common = &mut *this.common;
