@@ -24,11 +24,15 @@ from signorini_results import load
 
 # Titles of the printed table; the others are shown in comparison.csv alone.
 TITLES = {
-    "scene": "scene", "solver": "solver", "steps": "steps", "contact_changes": "contact moves",
-    "iterations": "its", "factorisations": "factors", "triangular_solves": "solve pairs",
-    "fallbacks": "fallbacks", "seconds": "seconds", "times_first": "times first", "kkt": "worst KKT",
+    "scene": "scene", "solver": "solver", "steps": "steps", "contact_changes": "contact changes",
+    "iterations": "iterations", "factorisations": "factors", "triangular_solves": "solves",
+    "fallbacks": "rescues", "seconds": "seconds", "times_first": "ratio", "kkt": "residual",
     "difference_u": "Δu", "difference_zeta": "Δζ", "difference_pressure": "Δp",
 }
+MEANINGS = """contact changes: steps in which the number of nodes in contact changes
+solves: pairs of triangular solves; rescues: steps that another solver computed
+ratio: seconds over those of the first solver; residual: largest KKT residual
+Δ: largest difference from the answer with the smallest residuals, over the largest value"""
 # The title of an additional column for failed solvers, and its width.
 REASON, WIDTH = "why it failed", 90
 DIFFERENCES = ["difference_u", "difference_zeta", "difference_pressure"]
@@ -189,8 +193,7 @@ def main(prog=None):
     except Refused as refused:
         return refused.args[0]
     print(table(rows))
-    print("Δ: largest differences from the answer with the smallest residuals; "
-          "times first: over the seconds of the scene's first solver")
+    print(MEANINGS)
     # Runs that fail at their start make no folder.
     arguments.out.mkdir(parents=True, exist_ok=True)
     with whole(path, is_own) as part:

@@ -93,7 +93,8 @@ def _contact(results, limits, factor, unit):
         return f"contact at {results.moment}, unloaded"
     if results.active is None:
         return f"contact at {results.moment}"
-    text = f"contact at {results.moment}; filled: {results.active} of {results.summary.get('contact_nodes', '?')} nodes"
+    nodes = results.summary.get("contact_nodes", "?")
+    text = f"{results.moment}: {results.active} of {nodes} nodes in contact (filled)"
     largest = results.pressure.max()
     if largest > limits.pressure > 0.0:
         is_singular = any(results.peak_of(curve).get("singular") for curve in results.curves)
