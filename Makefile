@@ -114,6 +114,9 @@ deb: build
 # The tools are in a virtual environment. The libraries and the program have folders of their own: they are other ones than those of
 # `make build`.
 WHEEL := target/wheel
+# Two wheels of one commit are equal: no folders and no times of the build are in them.
+wheel: export SOURCE_DATE_EPOCH := $(shell git log -1 --format=%ct 2>/dev/null)
+wheel: export RUSTFLAGS := --remap-path-prefix=$(CURDIR)=signorini --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=cargo
 wheel:
 	@scripts/deps.sh $(PACKAGES_WHEEL)
 	$(PYTHON) -m venv $(WHEEL)/tools

@@ -53,7 +53,9 @@ tar xf "petsc-$PETSC.tar.gz" --strip-components=1 -C "$folder/petsc"
 cp "$folder/petsc/LICENSE" "$folder/licenses/PETSc"
 cd "$folder/petsc"
 ./configure PETSC_ARCH=static --with-mpi=0 --with-fc=0 --with-cxx=0 --with-shared-libraries=0 --with-debugging=0 \
-    --with-x=0 --with-ssl=0 --with-valgrind=0 --with-hwloc=0 CFLAGS=-fPIC COPTFLAGS=-O2 \
+    --with-x=0 --with-ssl=0 --with-valgrind=0 --with-hwloc=0 "CFLAGS=-fPIC -ffile-prefix-map=$PWD=petsc" COPTFLAGS=-O2 \
     "--with-blaslapack-lib=-L$folder/lib -lopenblas -lgfortran -lquadmath -lm"
+# The library records where it was built. Two builds shall be equal.
+sed -i "s|$folder|wheel|g; /^.Machine characteristics/d" static/include/petsc{conf,configinfo,machineinfo}.h
 make PETSC_DIR="$PWD" PETSC_ARCH=static -j"$(nproc)" libs
 rm -rf static/obj
