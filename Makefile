@@ -260,7 +260,7 @@ fuzz: build
 
 # The archives and the steps are variables: see the script. The runs of this machine are compared.
 SYSTEMS ?=
-systems: mesh run
+systems: mesh run wheel
 	scripts/systems.sh $(SYSTEMS)
 
 clean:

@@ -53,7 +53,7 @@ def pack(program, stand_ins, licenses, gmsh, out):
     lines = [
         "Metadata-Version: 2.4", "Name: signorini", f"Version: {project['version']}",
         "Summary: Quasistatic contact of a damageable elastic body with a rigid foundation, on PETSc",
-        "License-Expression: GPL-3.0-or-later",
+        "License-Expression: GPL-3.0-or-later", "Description-Content-Type: text/plain",
         f"Requires-Python: {project['requires-python']}",
         *(f"Requires-Dist: {package}" for package in needed + extras),
         *(f"Provides-Extra: {extra}" for extra in project["optional-dependencies"]),
