@@ -1,14 +1,15 @@
-//! `signorini new`: writes a geometry and a scene as a start.
+//! `signorini new`: writes a geometry and a scene as a start, and the schema by which editors check scenes.
 
 use super::Failure;
 use signorini::output::{terminal::say, write_whole};
+use signorini::scene::SCHEMA;
 use std::{fs, path::Path};
 
 const GEOMETRY: &str = include_str!("new.geo");
 const FIRST_SCENE: &str = include_str!("new.toml");
 
 /// `signorini new NAME`: writes `NAME.geo` and `NAME.toml`, which run as they are. NAME may have the ending of
-/// one of the files.
+/// one of the files. The first line of the scene names the schema to editors; it is written unless it is there.
 pub fn new(name: &Path) -> Result<(), Failure> {
     let file = name.extension().is_some_and(|ending| ending == "toml" || ending == "geo");
     let Some(stem) = (if file { name.file_stem() } else { name.file_name() }) else {
@@ -28,7 +29,10 @@ pub fn new(name: &Path) -> Result<(), Failure> {
     }
     let file = geometry.file_name().unwrap_or_default().to_string_lossy();
     let text = FIRST_SCENE.replace("\"new.geo\"", &toml::Value::from(&*file).to_string());
-    for (path, text) in [(&geometry, GEOMETRY), (&scene, &text)] {
+    let schema = name.with_file_name("scene.schema.json");
+    let is_there = fs::symlink_metadata(&schema).is_ok();
+    let files = [(&geometry, GEOMETRY), (&scene, &text), (&schema, SCHEMA)];
+    for (path, text) in &files[..3 - usize::from(is_there)] {
         write_whole(path, text.as_bytes()).map_err(Failure::input)?;
     }
     let results = Path::new("out").join(stem);
