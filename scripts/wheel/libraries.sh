@@ -13,7 +13,10 @@ cd "$folder/downloads"
 apt-get -q download "$OPENBLAS"
 dpkg -x "$OPENBLAS"_*.deb openblas
 cp openblas/usr/lib/*/openblas-serial/libopenblas.a "$folder/lib"
-for name in cholmod amd camd colamd ccolamd suitesparseconfig gfortran quadmath gomp; do
+quadmath=
+# GCC has it for x86 alone.
+[ "$(uname -m)" != x86_64 ] || quadmath=quadmath
+for name in cholmod amd camd colamd ccolamd suitesparseconfig gfortran gomp $quadmath; do
     cp "$(gcc -print-file-name="lib$name.a")" "$folder/lib"
 done
 # CHOLMOD can order by METIS. The program orders by CAMD, so METIS is left out.
@@ -30,7 +33,8 @@ package() {
         >"$folder/lib/pkgconfig/$1.pc"
 }
 package CHOLMOD '-lcholmod -lamd -lcolamd -lccolamd -lcamd -lsuitesparseconfig -lstand_ins'
-package lapack '-lopenblas -lgfortran -lquadmath -lm'
+blas="-lopenblas -lgfortran ${quadmath:+-lquadmath} -lm"
+package lapack "$blas"
 package blas ''
 
 documents=/usr/share/doc
@@ -54,7 +58,7 @@ cp "$folder/petsc/LICENSE" "$folder/licenses/PETSc"
 cd "$folder/petsc"
 ./configure PETSC_ARCH=static --with-mpi=0 --with-fc=0 --with-cxx=0 --with-shared-libraries=0 --with-debugging=0 \
     --with-x=0 --with-ssl=0 --with-valgrind=0 --with-hwloc=0 "CFLAGS=-fPIC -ffile-prefix-map=$PWD=petsc" COPTFLAGS=-O2 \
-    "--with-blaslapack-lib=-L$folder/lib -lopenblas -lgfortran -lquadmath -lm"
+    "--with-blaslapack-lib=-L$folder/lib $blas"
 # The library records where it was built. Two builds shall be equal.
 sed -i "s|$folder|wheel|g; /^.Machine characteristics/d" static/include/petsc{conf,configinfo,machineinfo}.h
 make PETSC_DIR="$PWD" PETSC_ARCH=static -j"$(nproc)" libs
