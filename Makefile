@@ -114,7 +114,7 @@ deb: build
 	@scripts/deps.sh $(PACKAGES_DEB)
 	@command -v cargo-deb >/dev/null || cargo install --locked cargo-deb
 	scripts/package.sh $(BINARY) target/package
-	cargo deb --locked --no-build --strip
+	cargo deb --locked --no-build --strip --deb-version "$$(sed -n '1s/.*(\(.*\)).*/\1/p' target/package/changelog.Debian)"
 	@ls -sh target/debian/*.deb
 
 # Packages and wheels contain this file.

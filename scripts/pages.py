@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-FILES = ["README.md", "INSTALL.md", "geo/*.md", "geo/how-to/*.md", "geo/*.geo", "geo/*.toml", "geo/*.ipynb", "geo/*.png",
+FILES = ["README.md", "geo/*.md", "geo/how-to/*.md", "geo/*.geo", "geo/*.toml", "geo/*.ipynb", "geo/*.png",
          "geo/scene.schema.json", "validation/*.md", "validation/results/*.csv", "examples/*.rs"]
 
 
