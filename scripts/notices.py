@@ -20,7 +20,7 @@ SuiteSparse: AMD, CAMD, COLAMD,       BSD-3-Clause
   CCOLAMD, SuiteSparse_config
 OpenBLAS, LAPACK                      BSD-3-Clause
 libgomp, libgfortran, libgcc          GPL-3.0-or-later with the GCC Runtime Library Exception
-libquadmath                           LGPL-2.1-or-later
+libquadmath                           LGPL-2.0-or-later
 glibc                                 LGPL-2.1-or-later
 Rust's standard library               MIT OR Apache-2.0
 only for several processes, not in the wheel:
