@@ -126,7 +126,7 @@ licences:
 # `make build`.
 WHEEL := target/wheel
 # Two wheels of one commit are equal: no folders and no times of the build are in them.
-wheel: export SOURCE_DATE_EPOCH := $(shell git log -1 --format=%ct 2>/dev/null)
+wheel: export SOURCE_DATE_EPOCH := $(or $(shell git log -1 --format=%ct 2>/dev/null),$(shell stat -c %Y Cargo.toml))
 wheel: export RUSTFLAGS := --remap-path-prefix=$(CURDIR)=signorini --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=cargo
 wheel:
 	@scripts/deps.sh $(PACKAGES_WHEEL)
