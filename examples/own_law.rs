@@ -1,4 +1,4 @@
-//! A damage law of one's own in the loop of signorini: only tension damages.
+//! Your own damage law in the loop of signorini, here one by which only tension damages.
 //!
 //! The paper's source φ = −(λ_D (1 − ζ)/ζ + ½ λ_U min(|ε|², q*) − λ_W)₊ does not distinguish tension and compression.
 //! `cargo run --example own_law` presses and pulls a block by both laws. Where all strains are tensile they agree. Then a mesh

@@ -1,7 +1,7 @@
-//! A contact solver of one's own in the loop of signorini: projected successive over-relaxation.
+//! Your own contact solver in the loop of signorini, here projected successive over-relaxation.
 //!
 //! `cargo run --example own_solver` presses a block, which is damaged meanwhile, on a wavy foundation. It compares the
-//! answers with those of the default solver. A crate of one's own needs `signorini` in its Cargo.toml, and nothing else.
+//! answers with those of the default solver. Your crate needs `signorini` in its Cargo.toml, and nothing else.
 
 use signorini::{
     contact::{ContactError, ContactProblem, ContactReport, ContactSolver},

@@ -1,9 +1,18 @@
 //! **signorini**: an elastic body pressed against a rigid foundation while its
 //! material is damaged.
 //!
-//! # Use it as a library
+//! # Read, solve, look
 //!
-//! The program is a thin layer over this crate. This one reads a scene, runs it and prints its figures:
+//! | you want to | use |
+//! |---|---|
+//! | read a scene and its mesh | [`scene::Scene::read`], [`mesh::load`]; from memory [`scene::Scene::parse`], [`mesh::Mesh`] |
+//! | solve it | [`estimate::Simulation`] |
+//! | look at the figures | [`evolution::Outcome::last`] with [`observe::ObservedProblem::figures`], which has their names and labels |
+//! | look at the fields | [`problem::State`]: ζ, u and the contact; [`output::FieldWriter`] writes frames for ParaView |
+//! | adapt the mesh, get bars | [`accuracy::adapted`], [`evolution::Outcome::set_bars`]; `examples/own_law.rs` does both |
+//! | use your contact solver or damage law | [`contact::ContactSolver`], [`model::DamageSource`]; `examples/own_solver.rs`, `examples/own_law.rs` |
+//!
+//! A block under a pressure that grows, on a foundation:
 //!
 //! ```
 //! use signorini::{
@@ -16,28 +25,37 @@
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let text = "mesh.file = 'square.msh'
+//! // Read. Files are read by Scene::read("block.toml".as_ref(), &[]) and mesh::load(&scene.mesh.file, …).
+//! let text = "mesh.file = 'block.msh'
 //!     material = { young = 1e5, poisson = 0.3, plane = 'stress' }
 //!     time = { end = 1, step = 0.25 }
 //!     boundary = [{ name = 'bottom', gap = 0 }, { name = 'top', pressure = '500*t' }]";
-//! let scene = Scene::parse(text, "square.toml".as_ref(), &[])?;
-//! // Scene::read("file.toml") and mesh::load(&scene.mesh.file, …) read files.
+//! let scene = Scene::parse(text, "block.toml".as_ref(), &[])?;
 //! let problem = ObservedProblem::new(scene, Mesh::rectangle(1.0, 1.0, 8, 8))?;
+//!
+//! // Solve. The observer sees every accepted step.
 //! let session = Session::start(&[])?;
 //! let mut show = |step: &Step| {
 //!     println!("t = {}: largest |u| = {}", step.record.time, step.record.displacement_max);
 //!     Ok(())
 //! };
 //! let outcome = Simulation::new(&problem).observer(&mut show).run(&session)?;
-//! let force = outcome.last.record.contact_force;
-//! assert!((force - 500.0).abs() < 1e-6, "contact balances the pressure");
+//!
+//! // Look at the figures of the last state, at its fields, and at the estimated error.
+//! for (figure, value) in problem.figures.iter().zip(&outcome.last.figures) {
+//!     println!("{} ({}): {}", figure.label, figure.name, value.value);
+//! }
+//! let force = problem.figures.number("bottom.force_y").expect("a support has a force");
+//! assert!((outcome.last.figures[force].value - 500.0).abs() < 1e-6, "the foundation carries the pressure");
+//! let state = &outcome.last.state; // ζ per vertex of problem.mesh(), u_x and u_y in turn per node
+//! assert_eq!(state.u.len(), 2 * problem.mesh().nodes.len());
 //! println!("error of u: {:.1} %", 100.0 * outcome.errors.displacement_mesh);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! Contact solvers ([`contact::ContactSolver`]) and damage sources ([`model::DamageSource`]) of other authors run in the same
-//! loop, see `examples/own_solver.rs` and `examples/own_law.rs`. Vectors and matrices are those of [`nalgebra`].
+//! Vectors and matrices are those of [`nalgebra`]. Nodes of fields may have another order than those of a file:
+//! neighbouring nodes are close in memory.
 //!
 //! # The problem
 //!
