@@ -27,6 +27,9 @@ fn summary() {
     let summary = test_directory.summary("out/scene");
     let keys: Vec<&str> = summary.as_object().expect("an object").keys().map(|k| &**k).collect();
     assert_eq!(keys.join(" "), KEYS);
+    let page = include_str!("../../geo/RESULTS.md");
+    let absent = Vec::from_iter(keys.iter().filter(|key| !page.contains(&format!("`{key}"))));
+    assert_eq!(absent, Vec::<&&str>::new(), "geo/RESULTS.md describes every entry");
     let kkt = summary["kkt"].as_object().expect("an object");
     assert!(kkt.len() == 4 && kkt.values().all(|v| number(v) <= 1e-10));
     assert_eq!(summary["scene"], "scene");

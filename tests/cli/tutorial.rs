@@ -1,4 +1,4 @@
-//! `signorini new`, and the tutorial as it is typed.
+//! `signorini new`, and the tutorial and the README as they are typed.
 
 use crate::test_directory::{ProgramOutput, TestDirectory};
 use std::{fs, path::Path};
@@ -26,13 +26,26 @@ fn spaced(text: &str) -> String {
 
 #[test]
 fn every_command_of_the_tutorial_does_what_it_says() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("geo/TUTORIAL.md");
-    let page = fs::read_to_string(page).expect("the tutorial");
+    let (said, commands) = typed("geo/TUTORIAL.md", true);
+    assert!(commands >= 9 && said.contains("14 of 16 nodes active"), "{commands}: {said}");
+}
+
+#[test]
+fn the_first_commands_of_the_readme_do_what_it_says() {
+    assert_eq!(typed("README.md", false).1, 2);
+}
+
+/// Types the commands of a page, with its files or without, and checks that they print what the page says. Returns their output
+/// and their number.
+fn typed(page: &str, writes: bool) -> (String, usize) {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join(page);
+    let page = fs::read_to_string(page).expect("a page");
     let test_directory = TestDirectory::new();
     let (mut said, mut commands) = (String::new(), 0);
     for (before, kind, content) in blocks(&page) {
         match kind {
-            "geo" | "toml" => test_directory.write(named(before, kind), content),
+            "geo" | "toml" if writes => test_directory.write(named(before, kind), content),
+            "toml" | "rust,no_run" => {}
             "sh" => {
                 for line in content.lines().filter(|line| line.starts_with("signorini ")) {
                     // Figures have tests of their own.
@@ -62,7 +75,7 @@ fn every_command_of_the_tutorial_does_what_it_says() {
             }
         }
     }
-    assert!(commands >= 9 && said.contains("14 of 16 nodes active"), "{commands}: {said}");
+    (said, commands)
 }
 
 #[test]
