@@ -125,7 +125,7 @@ licences:
 # The tools are in a virtual environment. The libraries and the program have folders of their own: they are other ones than those of
 # `make build`.
 WHEEL := target/wheel
-# Two wheels of one commit are equal: no folders and no times of the build are in them.
+# Two wheels of one commit shall be equal, so no folder and no time of the build goes into them.
 wheel: export SOURCE_DATE_EPOCH := $(or $(shell git log -1 --format=%ct 2>/dev/null),$(shell stat -c %Y Cargo.toml))
 wheel: export RUSTFLAGS := --remap-path-prefix=$(CURDIR)=signorini --remap-path-prefix=$(or $(CARGO_HOME),$(HOME)/.cargo)=cargo
 wheel:
