@@ -10,14 +10,18 @@ from signorini_files import is_of_run
 from signorini_movies import FRAMES, movie
 
 
-def animate(results, factor, kind):
+# The pictures of which there are animations: those of the body have one.
+ANIMATED = {"deformed", "stress-damage", "pressure"}
+
+
+def animate(results, factor, kind, only):
     """Draws the animations of the body, `damage` or without damage `stress`, and `pressure` into the
-    result folder; yields their paths."""
+    result folder, if their pictures are among `only`; yields their paths."""
     chosen = states(results, evenly(results.frames, FRAMES))
     limits = limits_of(chosen, factor)
     body = "damage" if limits.is_damaged else "stress"
-    for name, draw in ((body, draw_state), ("pressure", draw_pressure)):
-        figure = draw(chosen[0], limits)
+    for name, draw, pictures in ((body, draw_state, ANIMATED - {"pressure"}), ("pressure", draw_pressure, {"pressure"})):
+        figure = draw(chosen[0], limits) if pictures & set(only) else None
         if figure is None:
             continue
         path = results.folder / f"{name}.{kind}"

@@ -1,6 +1,8 @@
-"""Figures with their error bars as text."""
+"""Figures with their error bars, and places, as text."""
 
+import re
 from decimal import ROUND_CEILING, Decimal
+from math import floor, log10
 
 # A bar that is a smaller part of its figure is below the rounding of its digits.
 ROUNDING = 1e-15
@@ -10,7 +12,14 @@ LEAST_BAR, DIGITS = 1e-6, 14
 
 def plain(number, digits=3):
     """A figure without a bar: 1220, not 1.22e+03, and 2e-6."""
-    return f"{float(f'{number:.{digits}g}'):.7g}".replace("e-0", "e-")
+    return re.sub(r"e\+?(-?)0*", r"e\1", f"{float(f'{number:.{digits}g}'):.{max(digits, 7)}g}")
+
+
+def placed(point, size):
+    """A point as text, (x, y) or one coordinate: to a thousandth of the size of the body, wherever this is."""
+    decimals = 3 - floor(log10(size))
+    texts = [plain(float(f"{x + 0.0:.{max(decimals, 0)}f}") + 0.0, 12) for x in point]
+    return f"({', '.join(texts)})" if len(texts) > 1 else texts[0]
 
 
 def barred(value, bar):

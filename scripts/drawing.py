@@ -34,6 +34,8 @@ from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
+from bars import placed
+
 if LIMIT != resource.RLIM_INFINITY:
     # OpenBLAS keeps the buffer that it allocates here, before the results take the memory.
     np.ones((64, 64)) @ np.ones((64, 64))
@@ -65,6 +67,8 @@ plt.rcParams.update({
 # the smallest and the largest stress of the colours, Pa, or None to choose; the corners of the part that maps show, (2, 2), m.
 OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
                           range=None, zoom=None)
+# Coordinates that are so many times farther from 0 than from each other count from a near origin.
+DISTANT = 1e3
 # Maps of bodies whose sides have a ratio above the first are stretched across, to about the second.
 SLENDER, STRETCHED = 30.0, 15.0
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
@@ -255,9 +259,25 @@ def frame(axes, box, units, stretch=(1.0, 1.0)):
     axes.set_xlim(box[:, 0])
     axes.set_ylim(box[:, 1])
     axes.set_aspect(stretch[1] / stretch[0], anchor="NW")
-    for axis, name, room, ticks in zip((axes.xaxis, axes.yaxis), "xy", _size_of(axes), (5.0, 2.5)):
+    for axis, name, ends, room, ticks in zip((axes.xaxis, axes.yaxis), "xy", box.T, _size_of(axes), (5.0, 2.5)):
         axis.set_major_locator(MaxNLocator(int(np.clip(room / (ticks * em()), 1, 6)), steps=[1, 2, 5, 10]))
-        axis.set_label_text(f"{name} ({units['length']})")
+        origin, power, less = coordinate(ends)
+        axis.set_label_text(f"{name}{less}{times_power(power, units['length'])}")
+        if origin or power:
+            axis.get_major_formatter().set_useOffset(origin)
+            axis.get_major_formatter().set_powerlimits((power, power))
+            axis.offsetText.set_visible(False)
+
+
+def coordinate(ends):
+    """How an axis between two values has ticks: a round number from which they count, which is 0 unless the values are far from 0,
+    and their power of ten, which is 0 unless they are very large or small; and the first one in the label, ` − 1000000`."""
+    span = np.ptp(ends)
+    unit = 10.0 ** np.ceil(np.log10(span)) if np.abs(ends).max() >= DISTANT * span > 0.0 else 0.0
+    origin = unit and unit * round(ends[0] / unit)
+    largest = np.abs(np.subtract(ends, origin)).max()
+    power = 0 if 1e-3 <= largest < 1e5 else power_of(largest)
+    return origin, power, f" {'+−'[int(origin > 0.0)]} {abs(origin):.12g}" if origin else ""
 
 
 def _size_of(axes):
@@ -423,11 +443,14 @@ def least_zeta(low):
 
 def along(points, units):
     """A coordinate along a path: x or y if the path follows this axis, otherwise arc length between its named ends."""
-    unit = units["length"]
+    unit, size = units["length"], np.ptp(points, axis=0).max()
     for k, (name, other) in enumerate(("xy", "yx")):
         if np.ptp(points[:, 1 - k]) <= 1e-9 * np.ptp(points[:, k]):
-            return points[:, k], f"{name} ({unit}) along {other} = {points[0, 1 - k]:g}"
+            origin, power, less = coordinate(np.sort(points[[0, -1], k]))
+            return ((points[:, k] - origin) / 10.0**power,
+                    f"{name}{less}{times_power(power, unit)} along {other} = {placed(points[:1, 1 - k], size)}")
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    first, last = (f"({x:.4g}, {y:.4g})" for x, y in points[[0, -1]])
+    _, power, _ = coordinate((0.0, steps.sum()))
+    first, last = (placed(of, size) for of in points[[0, -1]])
     way = f"once round from {first}" if first == last else f"{first} → {last}"
-    return np.concatenate(([0.0], np.cumsum(steps))), f"arclength ({unit}), {way}"
+    return np.concatenate(([0.0], np.cumsum(steps))) / 10.0**power, f"arclength{times_power(power, unit)}, {way}"

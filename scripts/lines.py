@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import signorini_results
+from bars import placed
 from drawing import INK, colours, em, legend, plot, room_for_legend, wrapped
 from limits import is_near_peak
 from reading import open_run
@@ -42,9 +43,9 @@ def draw_curves(arguments):
                 curves.append((", ".join(filter(None, parts)), places, values, peak, boundary and np.vstack(run.parts(boundary))))
                 rows += [{"run": run.folder.name, **({"boundary": boundary} if len(boundaries) > 1 else {}), "time": frame.time,
                           "s": s, quantity: value} for s, value in zip(places, values) if np.isfinite(s)]
-        path = folder / f"curves_{where}_{quantity}.csv"
+        path, unit = folder / f"curves_{where}_{quantity}.csv", units.get(UNITS.get(quantity, "stress"), "")
         with whole(path) as part:
-            write_table(rows, part)
+            write_table(rows, part, {"time": units["time"], "s": units["length"], **({quantity: unit} if unit else {})})
         yield path
         figure = _draw(curves, f"{_way(runs[0], arguments)} ({units['length']})", quantity, units)
         for ending in arguments.format:
@@ -93,7 +94,7 @@ def _way(run, arguments):
     if len(boundaries) > 1:
         return "distance along each boundary"
     parts = run.parts(arguments.along)
-    ends = [" → ".join(f"({x:.4g}, {y:.4g})" for x, y in part[[0, -1]]) for part in parts]
+    ends = [" → ".join(placed(point, np.ptp(np.vstack(parts), axis=0).max()) for point in part[[0, -1]]) for part in parts]
     return f"distance along {arguments.along}: {', '.join(ends[:3])}{' …' * (len(ends) > 3)}"
 
 

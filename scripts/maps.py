@@ -73,6 +73,8 @@ def draw_state(results, limits, figure=None):
 def deformed_map(results, limits):
     """The deformed mesh, the initial outline and the foundation; see `Results.foundation`."""
     moved = results.places(limits.factor)
+    fall = _fall(results, moved)
+    tips = np.vstack([limits.box, *(points + arrows for points, arrows in fall)])
 
     def paint(axes):
         mesh = Triangulation(*results.pieces.at_points(moved).T, results.pieces.triangles)
@@ -81,15 +83,16 @@ def deformed_map(results, limits):
         draw_outline(axes, moved, results, color=BLUE, linewidth=1.0, zorder=2.5)
         draw_outline(axes, results.nodes, results, color=INK, linewidth=0.9, linestyle=(0, (4, 2)), zorder=3)
         draw_foundation(axes, results, limits.factor)
-        _draw_fall(axes, results, moved)
+        for points, arrows in fall:
+            axes.quiver(*points.T, *arrows.T, color=RED, angles="xy", scale_units="xy", scale=1.0, width=0.004, zorder=4)
 
-    return Map(_amplified(results, limits), limits.box, paint, has_bar=False)
+    return Map(_amplified(results, limits), np.array([tips.min(axis=0), tips.max(axis=0)]), paint, has_bar=False)
 
 
 def von_mises_map(results, limits, factor=None):
     """The von Mises stress of the body, deformed by `factor`, or as `Results.factor` says."""
     *_, size, unit = stress_colours(results, limits.stress)
-    title, largest, is_singular = f"von Mises stress ({unit})", results.von_mises.max(), bool(results.singular())
+    title, largest, is_singular = f"von Mises stress ({unit})", results.von_mises[results.seen].max(), bool(results.singular())
     if OPTIONS.titles:
         said = results.said("von_mises_max", largest, size)
         title += f", largest {said}" + ": singular (circle)" * bool(is_singular and largest > 0.0)
@@ -112,7 +115,7 @@ def damage_map(results, limits, factor=None):
     power = power_of(limits.damage)
     title = f"damage 1 − ζ{times_power(power)}"
     if OPTIONS.titles:
-        title += f", least ζ {results.said('zeta_min', results.zeta.min(), written=least_zeta)}"
+        title += f", least ζ {results.said('zeta_min', results.zeta[results.seen].min(), written=least_zeta)}"
     factor = results.factor if factor is None else factor
 
     def paint(axes):
@@ -138,21 +141,19 @@ def _draw_sides(axes, pieces, points):
     axes.plot(*sides.reshape(-1, 2).T, color=BLUE, linewidth=min(0.6, 0.06 * edge), zorder=2)
 
 
-def _draw_fall(axes, results, moved):
-    """Arrows of the motion that nothing supports any more, at nodes along the boundary."""
+def _fall(results, moved):
+    """Points along the boundary and arrows there of the motion that nothing supports any more; empty without one."""
     outline = np.vstack(results.outline(moved))
     outline = outline[::max(1, len(outline) // ARROWS)]
     velocity = results.falling(outline)
-    if velocity is not None:
-        axes.quiver(*outline.T, *(0.12 * results.size * velocity).T, color=RED, angles="xy",
-                    scale_units="xy", scale=1.0, width=0.004, zorder=4)
+    return [] if velocity is None else [(outline, ARROW * results.size * velocity)]
 
 
 def _amplified(results, limits):
     """The amplification in words, with titles also the largest displacement."""
     if results.unloaded:
         return "unloaded"
-    largest = results.said("displacement_max", np.linalg.norm(results.displacement, axis=1).max())
+    largest = results.said("displacement_max", np.linalg.norm(results.displacement[results.seen], axis=1).max())
     what = "displacements and gaps" if len(results.contact) else "displacements"
     scale = "to scale" if limits.factor == 1.0 else f"× {limits.factor:g}"
     if not OPTIONS.titles:

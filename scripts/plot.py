@@ -33,7 +33,7 @@ from math import inf, isfinite
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
 from drawing import OPTIONS
-from animation import animate
+from animation import ANIMATED, animate
 from contact_pressure import draw_evolution, draw_pressure, draw_pressures
 from histories import draw_damage_history, draw_force_displacement, draw_forces
 from limits import box_of, limits_of
@@ -137,6 +137,8 @@ def arguments_of(prog):
             parser.error(f"--{name}: must be positive" + (f", below {most:g} inches" if most < inf else ""))
     if arguments.range and not 0.0 <= arguments.range[0] < arguments.range[1] < inf:
         parser.error("--range: needs 0 <= A < B")
+    if arguments.animate and not set(arguments.only) & ANIMATED:
+        parser.error(f"--animate: --only has none of {', '.join(sorted(ANIMATED))}; add one")
     if arguments.time is not None and not isfinite(arguments.time):
         parser.error("--time: must be a number")
     return arguments
@@ -202,7 +204,7 @@ def draw(results, limits, arguments):
         chosen = states(results, results.frames[::stride])
         save(draw_evolution(chosen, limits_of(chosen)), last, "contact-evolution", arguments.format)
     if arguments.animate:
-        for path in animate(results, arguments.factor, arguments.animate):
+        for path in animate(results, arguments.factor, arguments.animate, arguments.only):
             tell(path)
 
 
@@ -249,7 +251,7 @@ def main(prog=None):
     for folder in arguments.folders:
         with telling(folder) as problems:
             runs.append(read_without_fields(folder, arguments.time) if arguments.together else
-                        read_results(folder, arguments.time, arguments.material))
+                        read_results(folder, arguments.time, arguments.material, arguments.zoom))
             last = runs[-1].frames[-1][0]
             asked = max([*filter(None, [arguments.time]), *(arguments.times or [])], default=last)
             if asked > last:

@@ -12,8 +12,9 @@ from drawing import (
 from limits import stress_top
 from results import ROUNDING
 
-# About so many lines along the longer side of the body, and to an inch at most.
-LINES, DENSITY = 24, 5.0
+# About so many lines along the longer side of the body, and to an inch at most; and at least so many across it, as a beam
+# has tension beside compression.
+LINES, DENSITY, LEAST = 24, 5.0, 2
 
 
 def draw_principal(results, _limits, figure=None):
@@ -40,8 +41,8 @@ def principal_maps(results):
         title = f"{name} ({unit})"
         if OPTIONS.titles:
             # The smallest σ₂ is negative where there is compression.
-            said = results.said(key, (2 * k - 1) * stress.max(), (2 * k - 1) * factor)
-            title += f", largest {said}" + ": singular" * bool(results.singular(key)) if stress.any() else ": none"
+            said = results.said(key, (2 * k - 1) * stress[results.seen].max(), (2 * k - 1) * factor)
+            title += f", largest {said}" + ": singular" * bool(results.singular(key)) if stress[results.seen].any() else ": none"
 
         def paint(axes):
             draw_stress(axes, mesh_of(results, results.places(results.factor)), results, stress, top)
@@ -53,11 +54,19 @@ def principal_maps(results):
     return [map_of(*part) for part in parts]
 
 
+def _part_of(results):
+    """The lower left corner and the size of the body, or of the part that the maps show."""
+    low, high = results.nodes.min(axis=0), results.nodes.max(axis=0)
+    if results.zoom is not None:
+        low, high = np.maximum(low, results.zoom[0]), np.minimum(high, results.zoom[1])
+    return low, high - low
+
+
 def _principal_at(results, spacing):
     """The points of a regular lattice in the shown part of the body, displaced, and the eigenvalues and eigenvectors of
     the stresses there, in increasing order."""
-    low, extent = results.nodes.min(axis=0), np.ptp(results.nodes, axis=0)
-    counts = np.maximum(1, np.round(extent / spacing).astype(int))
+    low, extent = _part_of(results)
+    counts = np.maximum(LEAST, np.round(extent / spacing).astype(int))
     steps = (low[k] + (np.arange(count) + 0.5) * extent[k] / count for k, count in enumerate(counts))
     points = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
     state = _frame_of(results.folder, results.time)
@@ -75,7 +84,7 @@ def _frame_of(folder, time):
 def _draw_lines(axes, results, k, top):
     """Lines along the direction of the smaller (k = 0) or larger (k = 1) principal stress, within the body, as long as
     the stress is high. White under dark ones keeps them visible."""
-    extent = np.ptp(results.nodes, axis=0)
+    _, extent = _part_of(results)
     inches = axes.get_position().size * axes.figure.get_size_inches()
     longest = extent.max() / min(LINES, DENSITY * inches.max())
     points, values, directions = _principal_at(results, longest)
@@ -86,4 +95,4 @@ def _draw_lines(axes, results, k, top):
     body = Path.make_compound_path(*map(Path, results.outline(results.places(results.factor))))
     for colour, width in (("white", 1.8), (INK, 0.8)):
         axes.plot(*ends.reshape(-1, 2).T, color=colour, linewidth=width, zorder=3, solid_capstyle="round",
-                  clip_path=(body, axes.transData))
+                  clip_path=(body, axes.transData), clip_box=axes.bbox)

@@ -17,7 +17,7 @@ import numpy as np
 import signorini_results
 from elements import Pieces, counter_clockwise
 from expressions import evaluate, with_values
-from results import ContactCurve, ResultError, Results, of_material, read_table, without_roundoff
+from results import ContactCurve, ResultError, Results, of_part, read_table, without_roundoff
 
 
 @contextmanager
@@ -51,9 +51,9 @@ def open_run(folder, files=(("history.csv", "columns"), ("fields.pvd", "frames")
         raise ResultError(f"{error.filename}: {error.strerror}{what}") from None
 
 
-def read_results(folder, time=None, material=None):
+def read_results(folder, time=None, material=None, zoom=None):
     """The contents of a folder of results, with the frame nearest to `time` or the last frame; of one material only, if
-    it is named."""
+    it is named, and of the part between the corners `zoom`, for maps."""
     run = open_run(folder)
     scene = _scene_of(run.folder)
     chosen = run.frames[-1 if time is None else nearest(run.frames, time)]
@@ -62,7 +62,7 @@ def read_results(folder, time=None, material=None):
         elements = np.vstack([block.data for block in fields.cells if block.type in ("triangle", "triangle6")])
         pieces = Pieces(counter_clockwise(fields.points, elements), fields.point_data.get("global_node"))
         results = Results(run.folder, run.summary, scene, run.columns, run.frames, chosen[0], fields.points[:, :2],
-                          pieces, material=material)
+                          pieces, material=material, zoom=zoom and np.array(zoom))
         return with_fields(results, chosen[0], fields)
     except KeyError as error:
         raise ResultError(f"{folder}: the field {error} is missing") from None
@@ -113,7 +113,7 @@ def with_fields(results, time, fields):
     """The results with another frame of the same run."""
     points, materials = fields.point_data, fields.cell_data.get("material")
     contact, tangents, obstacle = _foundation(results, time, points["displacement"][:, :2])
-    return of_material(without_roundoff(replace(
+    return of_part(without_roundoff(replace(
         results, time=time, contact=contact, tangents=tangents, obstacle=obstacle,
         curves=_contact_curves(results.folder, time),
         materials=materials and np.concatenate(materials),

@@ -24,7 +24,7 @@ from string import Template
 import drawing
 import numpy as np
 from drawing import FAINT, RED, plt, wrapped
-from bars import barred, plain
+from bars import barred, placed, plain
 from contact_pressure import draw_evolution
 from plot import PICTURES
 from histories import draw_histories
@@ -197,7 +197,7 @@ def governing(results):
         if name == "zeta_min" and is_stopped:
             text, time = "reached ζ_*", results.stopping_time
         label = figure["label"].replace(" away from singular points", f", {_away(results)}")
-        rows.append((label, text, figure["unit"], time, f"({place[0]:.4g}, {place[1]:.4g})" if place else "",
+        rows.append((label, text, figure["unit"], time, placed(place, results.size) if place else "",
                      last * (last != text), reason(results, name, figure) if flagged else ""))
     before = ", before the stop" if results.summary.get("stopped_by") else ""
     head = ("", "over all steps", "", f"at t ({results.units['time']})", f"at ({results.units['length']})",
@@ -226,7 +226,9 @@ def by_name(results, with_places=True):
         rows = []
         for name in group:
             cells = [[figures[f"{name}.{kind}"] for kind in column] for column in columns]
-            last = [_cell((of, of["value"]) for of in cell) for cell in cells]
+            # Figures without an extreme are coordinates of places, and lengths of the scene.
+            last = [_cell((of, of["value"]) for of in cell) if cell[0]["governing"] or any(of["value"] is None for of in cell)
+                    else placed([of["value"] for of in cell], results.size) for cell in cells]
             extremes = [[(of, of["governing"]) for of in cell if of["governing"]] for cell in cells]
             most = [_cell((of, extreme["value"], is_flagged(of, extreme)) for of, extreme in cell) for cell in extremes]
             times = [", ".join(dict.fromkeys(f"{extreme['time']:g}" for _, extreme in cell)) for cell in extremes]

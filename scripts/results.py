@@ -101,6 +101,7 @@ class Results:
     curves: list = None  # the ContactCurves of Γ_C
     materials: np.ndarray = None  # (m,): the number of the material of each element; None for one
     material: str = None  # the name of the material that maps show; None for all
+    zoom: np.ndarray = None  # (2, 2): the corners of the part that maps show, m; None for all
     displacement: np.ndarray = None  # (n, 2), m
     zeta: np.ndarray = None  # (n,)
     von_mises: np.ndarray = None  # (n,), Pa
@@ -183,34 +184,49 @@ class Results:
         figures = self.summary.get("figures", {})
         left_out = ["contact_force"] if sum(name.endswith(".contact_length") for name in figures) < 2 else []
         scales = {}
-        for of in figures.values():
-            scales[of["unit"]] = max(scales.get(of["unit"], 0.0), abs(of["value"] or 0.0))
-        # A moment has the size of a force at the other end of the body.
-        moment, force = self.units["force"], self.units["line"]
-        scales[moment] = max(scales.get(moment, 0.0), scales.get(force, 0.0) * self.size)
+        for name, of in figures.items():
+            scales[_kind(name, of)] = max(scales.get(_kind(name, of), 0.0), abs(of["value"] or 0.0))
+        # A moment about the origin has the size of a force at the far end of the body.
+        moment, force = (self.units["force"], False), (self.units["line"], False)
+        scales[moment] = max(scales.get(moment, 0.0), scales.get(force, 0.0) * max(self.size, np.abs(self.nodes).max()))
         is_damaged = not self.scene or "damage" in self.scene
-        return {name: _without_roundoff(of, scales[of["unit"]]) for name, of in figures.items() if name not in left_out
+        return {name: _without_roundoff(of, scales[_kind(name, of)]) for name, of in figures.items() if name not in left_out
                 and (is_damaged or not name.rpartition(".")[2].startswith("zeta"))}
 
     def elasticity(self, name="material"):
         """The elastic constants of a material, in words."""
         general = self.scene.get("material", {})
         of = {**general, **general.get(name, {})}
-        young = f"{of['young']:g}".replace("e+", "e").replace("e0", "e") if "young" in of else ""
+        young = plain(of["young"], 6) if "young" in of else ""
         words = [f"E = {young} {self.units['stress']}", f"ν = {of['poisson']:g}"] if young else []
         return ", ".join(words + ([f"ρ = {of['density']:g}"] if of.get("density") else []))
 
     @property
     def shown(self):
         """Per element: do maps show it?"""
+        corners = self.places(self.factor)[self.pieces.elements]
+        low, high = (-np.inf, np.inf) if self.zoom is None else self.zoom
+        is_there = ((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low)).all(axis=1)
         if self.material is None:
-            return np.full(len(self.pieces.elements), True)
+            return is_there
         names = [] if self.materials is None else self.material_names
         shown = self.materials == names.index(self.material) if self.material in names else np.array(False)
         if not shown.any():
             raise ResultError(f"{self.folder}: no triangle has the material {self.material}; "
                               f"the scene has {', '.join(names) or 'one material'}")
-        return shown
+        return shown & is_there
+
+    @property
+    def seen(self):
+        """Per node: do maps show it?"""
+        nodes = np.isin(np.arange(len(self.nodes)), self.pieces.elements[self.shown])
+        inside = nodes & self.has(self.places(self.factor))
+        return inside if inside.any() else nodes
+
+    def has(self, points):
+        """Per point: is it in the part that maps show?"""
+        low, high = (-np.inf, np.inf) if self.zoom is None else self.zoom
+        return ((points >= low) & (points <= high)).all(axis=-1)
 
     @property
     def overrides(self):
@@ -230,7 +246,7 @@ class Results:
         figure = self.summary.get("figures", {}).get(name) or {}
         if self.is_last and figure:
             value = figure["value"]
-        elif (column := f"{self.material}.{name}" if self.material else name) in self.history:
+        elif self.zoom is None and (column := f"{self.material}.{name}" if self.material else name) in self.history:
             value = self.history[column][self.step]
         if flag_of(figure)[0]:
             return plain(value / factor, 2)
@@ -309,9 +325,12 @@ class Results:
         obstacle a node that slides meets other points, so these follow its sliding, as far as this is amplified:
         x + factor g ν + (factor − 1) (u·τ) τ.
         """
-        data = np.round(np.concatenate((self.contact, self.obstacle, self.tangents), axis=2), 12)
-        return [self._part(*np.hsplit(np.array(path), 3), factor)
-                for path in paths([tuple(map(tuple, edge)) for edge in data.tolist()])]
+        data = np.concatenate((self.contact, self.obstacle, self.tangents), axis=2).reshape(-1, 6)
+        # Edges join at equal ends, except for rounding.
+        ends = [tuple(end) for end in np.round(data / np.repeat((self.size, self.size, 1.0), 2), 9).tolist()]
+        exact = dict(zip(ends, data))
+        return [self._part(*np.hsplit(np.array([exact[end] for end in path]), 3), factor)
+                for path in paths(list(zip(ends[::2], ends[1::2])))]
 
     def _part(self, nodes, opposite, tangents, factor):
         """A connected part of the amplified obstacle."""
@@ -357,15 +376,27 @@ def amplification(size, largest):
     return power * max(m for m in (1, 2, 5) if m * power <= wanted * (1 + 1e-12))
 
 
-def of_material(results):
-    """The results with values outside the chosen material that do not enter the scales of maps, and with its extremes."""
-    if results.material is None:
+def of_part(results):
+    """The results with values outside the chosen material and part that do not enter the scales of maps, and with the extremes
+    that are there."""
+    if results.material is None and results.zoom is None:
         return results
-    name = f"{results.material}."
-    own = lambda of: {key.removeprefix(name): value for key, value in (of or {}).items() if key.startswith(name)}
+    name = f"{results.material}." if results.material else ""
+    places = results.nodes, results.places(results.factor)
+
+    def is_own(key, of):
+        if key.endswith("pressure_max"):
+            return True
+        at = places[1][np.linalg.norm(places[0] - of["at"], axis=1).argmin()] if of["at"] else None
+        return key.startswith(name) and (results.zoom is None or at is not None and results.has(at))
+
+    figures = {key.removeprefix(name): of for key, of in results.summary.get("figures", {}).items() if is_own(key, of)}
     inside = np.isin(np.arange(len(results.nodes)), results.pieces.elements[results.shown])
+    if not inside.any():
+        # Only the magnified body, or a foundation, is there.
+        return replace(results, zoom=None)
     return replace(
-        results, summary={**results.summary, "figures": own(results.summary.get("figures"))},
+        results, summary={**results.summary, "figures": figures},
         zeta=np.where(inside, results.zeta, results.zeta[inside].max()), von_mises=results.von_mises * inside,
         principal=results.principal * inside[:, None])
 
@@ -379,6 +410,11 @@ def surfaces_of(folder):
         with open(path, encoding="utf-8", errors="replace") as file:
             found |= {geometry or mesh for geometry, mesh in SURFACE.findall(file.read(FIRST_BYTES))}
     return frozenset(found)
+
+
+def _kind(name, figure):
+    """The unit of a figure, and is it a displacement? Coordinates and lengths of contact are as large as the body."""
+    return figure["unit"], name.rpartition(".")[2].startswith(("displacement", "u_"))
 
 
 def _without_roundoff(figure, scale):

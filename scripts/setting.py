@@ -10,6 +10,7 @@ from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from matplotlib.tri import Triangulation
 
+from bars import plain
 from drawing import (
     BLUE, FAINT, GREEN, INK, LINE, RED, Map, Strokes, draw_foundation, draw_maps, draw_outline, em, headline, inch_of, legend,
     room_for_legend, wide, width_of, wrapped,
@@ -332,14 +333,19 @@ def _words(condition, units):
     words = {
         "displacement": lambda u: f"u = {_pair(u)} {length}",
         "symmetry": lambda _: "u·ν = 0",
-        "gap": lambda gap: f"gap g = {gap} {length}",
+        "gap": lambda gap: f"gap g = {_text(gap)} {length}",
         "normal": lambda normal: f"along ν = {_pair(normal)}",
         "traction": lambda force: f"traction {_pair(force)} {area}",
-        "pressure": lambda pressure: f"pressure {pressure} {area}",
+        "pressure": lambda pressure: f"pressure {_text(pressure)} {area}",
     }
     parts = [say(condition[key]) for key, say in words.items() if condition.get(key, False) is not False]
     return ", ".join(parts)
 
 
 def _pair(components):
-    return f"({', '.join(map(str, components))})"
+    return f"({', '.join(map(_text, components))})"
+
+
+def _text(value):
+    """A number of the scene, or an expression, as text."""
+    return plain(value, 7) if isinstance(value, float) else str(value)

@@ -350,7 +350,7 @@ class Plot:
         axes.figure.colorbar(axes.tripcolor(*points.T, corners, values, **style), ax=axes, label=label,
                              extend="max" if values.max() > style["vmax"] else "neither")
         axes.set(aspect="equal", xlabel=f"x ({self.units['length']})", ylabel=f"y ({self.units['length']})",
-                 title=f"t = {frame.time:g} {self.units['time']}")
+                 title=f"t = {frame.time:g} {self.units['time']}" + f", displacements × {factor:g}" * bool(factor))
         return _plain(axes)
 
     def pressure(self, time=None, axes=None):

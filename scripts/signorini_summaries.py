@@ -31,6 +31,8 @@ KINDS = {
     "boundaries": {"*": [[[(float, int)]]]}, "provenance": {"command": [str], "machine": {}},
     "collapse": ({"motion": str, "velocity": VELOCITY}, type(None)), "errors": ({}, type(None)),
 }
+# Other entries with numbers.
+ENTRIES = ("ranks", "nodes", "triangles", "contact_nodes", "active_nodes", "seconds_per_step", "peak_megabytes", "reached")
 
 
 def is_of(kind, value):

@@ -16,6 +16,7 @@ What follows `--` are other arguments of `run`.
 
 import argparse
 import csv
+import difflib
 import errno
 import fcntl
 import itertools
@@ -25,6 +26,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 import zlib
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -33,7 +35,7 @@ from pathlib import Path
 
 from server import Server
 from signorini_files import check, check_folder, is_of_study, whole
-from signorini_summaries import columns_of, rows_of, summary_of, unknown
+from signorini_summaries import ENTRIES, KINDS, columns_of, is_study, rows_of, runs_of, summary_of, unknown
 from table import names_of, printed, refused, write_table
 
 # The column of --cases that names the runs.
@@ -164,6 +166,42 @@ def outcome(folder, error):
     summary = summary_of(folder) if os.path.exists(folder / "summary.json") else {}
     lines = [line.removeprefix("error: ") for line in error.splitlines() if line.startswith("error")]
     return summary if not error or "error" in summary else {"error": " ".join(lines) or error}
+
+
+def other_study(out, folders, scene):
+    """Why the table in `out` is that of another study: it lists other runs, or they are of another scene; "" if it is not."""
+    if not is_study(out):
+        return ""
+    listed = [Path(run) for run in runs_of(out)]
+    others = [run.name for run in listed if run not in folders]
+    with suppress(ValueError, LookupError):
+        command = summary_of(listed[0])["provenance"]["command"]
+        others += [command[2]] * (Path(command[2]).name != Path(scene).name)
+    return f"{out / 'study.csv'} is the table of another study, of {others[0]}; choose another folder by --out, or move it away" if others else ""
+
+
+def no_figure(names, keys, scene):
+    """What is wrong with names of figures of a scene; "" if nothing is. Names may also be those of other entries of summary.json and
+    of `keys`."""
+    try:
+        found = tomllib.loads(Path(scene).read_text(encoding="utf-8"))
+        tables = [of for name in ("material", "damage") for of in found.get(name, {}).items()]
+        owners = {"BOUNDARY": [of["name"] for of in found.get("boundary", [])],
+                  "PROBE": [of["name"] for of in found.get("probe", [])],
+                  "MATERIAL": ["material", *(name for name, of in tables if isinstance(of, dict))]}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        # The program says what is wrong.
+        return ""
+    listed = subprocess.run([os.environ["SIGNORINI"], "keys", "--figures"], capture_output=True, text=True).stdout
+    known = [f"{owner}{point}{kind}" for first, point, kind in re.findall(r"^\| `(\w+)(\.?)(\w*)`", listed, re.MULTILINE)
+             for owner in owners.get(first, [first])]
+    for name in names:
+        is_figure = any(name == of or name.startswith(f"{of}.") for of in known)
+        if not is_figure and name.partition(".")[0] not in (*KINDS, *ENTRIES) and name not in keys:
+            near = difflib.get_close_matches(name, known, 1)
+            return f"{name} is no figure of {scene}; " + (
+                f"did you mean {near[0]}?" if near else "`signorini keys --figures` lists all names")
+    return ""
 
 
 def own(out, pictures):
@@ -327,7 +365,10 @@ def main(prog=None):
     named = [(label, product if label else case + product) for label, case in cases for product in products]
     folders = [out / name for name in names_for(named)]
     commands = [command_of(arguments.scene, folder, of + extra, more) for folder, of in zip(folders, chosen)]
-    if problem := problem_of(arguments, commands[0]):
+    problem = problem_of(arguments, commands[0]) or other_study(out, folders, arguments.scene)
+    if arguments.plot and not problem:
+        problem = no_figure(arguments.plot, head + keys, arguments.scene)
+    if problem:
         print(f"error: {problem}", file=sys.stderr)
         return 2
     pictures = []

@@ -66,6 +66,9 @@ def draw_studies(folders, summaries, names, target, over=None, settings=None, fo
         raise ResultError(f"--over {over}: the runs do not differ in it; choose {', '.join([*keys, 'run'])}")
     key = over or next(iter(keys), "run")
     others = [name for name in keys if name != key]
+    if len({of.get(key) for of in settings}) == 1 and key != "run" or len(folders) == 1:
+        print(f"note: the pictures have one value of {key}; figures of a run in time: `signorini plot {folders[0]} --only "
+              "force-displacement`, also with --abscissa COLUMN, and history.csv", file=sys.stderr)
     if failed:
         print(f"note: the pictures lack the failed runs {', '.join(failed)}", file=sys.stderr)
     for name, (table, *pictures) in paths_of(target, names, formats).items():
@@ -147,6 +150,8 @@ def _draw(name, key, others, rows, unit, summaries, left_out):
     below = room_for_legend(labels, always=len(labels) > 1)
     label = _label(name, summaries)
     titles = {summary.get("title", "") for summary in summaries}
+    # A key without a table is that of a constant.
+    key = key if "." in key or key == "run" else f"constant {key}"
     caption = "; ".join([f"{label} over {key}", *left_out])
     caption = "\n".join([*(titles if len(titles) == 1 else ()), textwrap.shorten(caption, 300, placeholder=" …")])
     figure, axes = plot(caption, below=below + lower)

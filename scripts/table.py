@@ -9,16 +9,23 @@ summary.json with their units and error bars.
 import argparse
 import csv
 import sys
+from math import floor, log10
 
 import latex
 from bars import barred, plain
 from signorini_summaries import FLAGS, columns_of, flag_of, folders_of, named, rows_of, summary_of, unknown
 
 
-def text_of(value):
+# The figures that are coordinates of places begin so; they have digits far from the origin also.
+PLACES = ("contact_start_", "contact_end_", "peak_", "acts_at_")
+
+
+def text_of(value, decimals=None):
+    """A value of a table as text: a float with six digits, or with so many `decimals` if these are more."""
     if value is None:
         return ""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    digits = 6 if decimals is None or not value else max(6, 1 + decimals + floor(log10(abs(value))))
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
 
 
 def names_of(text):
@@ -60,7 +67,8 @@ def printed(rows, units, form=None):
         value, bar = row.get(name), row.get(f"{name}.bar")
         text = barred(value, bar) if bar is not None and value is not None else None
         flag, _ = flag_of({flag[1:]: row.get(f"{name}{flag}") for flag in FLAGS})
-        return f"{plain(value, 2)} {flag}" if flag else text or text_of(value)
+        is_place = name.rpartition(".")[2].startswith(PLACES)
+        return f"{plain(value, 2)} {flag}" if flag else text or text_of(value, 4 if is_place else None)
 
     names = list(dict.fromkeys(name for row in rows for name in row if not name.endswith((".bar", *FLAGS))))
     names = [name for name in names if any(row.get(name) not in (None, "") for row in rows)]

@@ -7,6 +7,7 @@ import zlib
 import matplotlib
 import numpy as np
 
+from bars import placed
 from drawing import stress_unit
 from limits import SINGULAR_PEAK
 from reading import evenly, states
@@ -114,8 +115,8 @@ def along(edges):
 def curve_of(curve, number, units):
     """A connected part of Γ_C: its name, its nodes and their distances along it."""
     steps = np.linalg.norm(np.diff(curve.points, axis=0), axis=1)
-    x, y = curve.points[0]
-    return {"title": f"{curve.name}, from ({x:.4g}, {y:.4g}) {units['length']}",
+    at = placed(curve.points[0], np.ptp(curve.points, axis=0).max())
+    return {"title": f"{curve.name}, from {at} {units['length']}",
             "nodes": [number[point] for point in map(tuple, curve.points.tolist())],
             "arc": np.concatenate(([0.0], np.cumsum(steps))).tolist()}
 
