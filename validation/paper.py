@@ -1,6 +1,7 @@
 #!/usr/bin/python3
-"""The paper's Figures 1 to 9 and its Table 1 in its layout, into out/paper: displacements × 10, ζ rather than 1 − ζ, as wide as
-columns or pages of a journal; and a sheet of all of them, as wide as its page, for a reader who has the paper beside it.
+"""The paper's Figures 1 to 9 and its Table 1 in its layout, into out/paper: displacements × 10, ζ rather than 1 − ζ. Figures 6
+and 9 are as wide as a page of a journal (170 mm), the others as a column (85 mm). A sheet has all of them, as wide as its
+page, for a reader who has the paper beside it.
 
     paper.py [--binary FILE] [--quick]
 
@@ -23,8 +24,8 @@ from reading import read_results
 from results import write_table
 from setting import draw_setting
 
-# The widths of a column and of the page of a journal, and dots per inch.
-COLUMN, PAGE, DPI = 3.5, 7.2, 300
+# The widths of a column and of the page of a journal, 85 mm and 170 mm, in inches, and dots per inch.
+COLUMN, PAGE, DPI = 85 / 25.4, 170 / 25.4, 300
 # Scene, overrides, and the figures of its run: number → drawing.
 RUNS = {
     "square": (["mesh.size=0.125", "time.end=0.01", "time.step=0.01"], {2: "setting"}),
