@@ -63,9 +63,9 @@ plt.rcParams.update({
 
 # What the command line asks of pictures: their width, inches, or None for widths of their own; the size of letters,
 # points, or None for one that suits the width; the largest height of maps and panels, inches; whether they have titles, and in
-# these the name of the run; whether maps have contour lines; the column of history.csv over which forces are drawn, and
+# these the name of the run; whether maps have axes; whether maps have contour lines; the column of history.csv over which forces are drawn, and
 # the smallest and the largest stress of the colours, Pa, or None to choose; the corners of the part that maps show, (2, 2), m.
-OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, contours=False, abscissa=None,
+OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=True, axes=True, contours=False, abscissa=None,
                           range=None, zoom=None)
 # Coordinates that are so many times farther from 0 than from each other count from a near origin.
 DISTANT = 1e3
@@ -193,7 +193,7 @@ class Map:
 
 def draw_maps(maps, caption, units, figure=None, below=0.0):
     """A picture of maps with one scale, in that number of columns in which they are largest."""
-    left, right, top, bottom = (em() * of for of in AROUND_MAPS)
+    left, right, top, bottom = (em() * of for of in (AROUND_MAPS if OPTIONS.axes else [0.6] * 4))
     right = BAR * em() if any(of.has_bar for of in maps) else right
     is_field = all(of.is_field for of in maps)
     boxes = [_with_margin(of.box) if OPTIONS.zoom is None or not is_field else np.array(OPTIONS.zoom) for of in maps]
@@ -259,6 +259,8 @@ def frame(axes, box, units, stretch=(1.0, 1.0)):
     axes.set_xlim(box[:, 0])
     axes.set_ylim(box[:, 1])
     axes.set_aspect(stretch[1] / stretch[0], anchor="NW")
+    if not OPTIONS.axes:
+        axes.axis("off")
     for axis, name, ends, room, ticks in zip((axes.xaxis, axes.yaxis), "xy", box.T, _size_of(axes), (5.0, 2.5)):
         axis.set_major_locator(MaxNLocator(int(np.clip(room / (ticks * em()), 1, 6)), steps=[1, 2, 5, 10]))
         origin, power, less = coordinate(ends)

@@ -43,10 +43,9 @@ EVOLUTION = 50
 # The scripts of the viewer, in the order in which they need each other, and the pictures in the place of which it stands.
 SCRIPTS = "data.js", "locator.js", "body.js", "overlay.js", "charts.js", "viewer.js"
 IN_VIEWER = "deformed", "stress-damage", "principal-stresses"
-# The least height, inches, for the maps of the PDF on a page with other blocks: of their labels, and over that of a body that is as
-# wide as the page; and the largest such height. The largest height of the setting and of the pressure there, and of
-# the setting with many names.
-LEAST_LABELS, LEAST_BODY, LEAST_MAPS, LOW, HIGH, MANY = 1.2, 2.8, 3.0, 2.2, 4.0, 7
+# The letters of pictures in the PDF, points. The least height, inches, for its maps on a page with other blocks, where they have no
+# axes; the width and the largest height of the setting, and its height if it has many names.
+LETTERS, LEAST_MAPS, BESIDE, LOW, HIGH, MANY = 7, 2.4, 2.1, 2.4, 4.0, 7
 # The limits of the model, for the head of the report.
 MODEL = "Limits of the model: two dimensions, small strains, no inertia; one body, a rigid foundation without friction."
 # What the processes draw, by name.
@@ -217,18 +216,23 @@ def by_name(results, with_places=True):
             names.setdefault(name, []).append(kind)
     for name, kinds in names.items():
         alike.setdefault(tuple(kinds), []).append(name)
+    # A table of many columns also has the names that have some of them.
+    for kinds in sorted(alike, key=len):
+        if larger := next((others for others in alike if set(kinds) < set(others)), None):
+            alike[larger] = sorted(alike[larger] + alike.pop(kinds), key=list(names).index)
     for kinds, group in alike.items():
+        full = next(name for name in group if tuple(names[name]) == kinds)
         pairs = {kind: f"{kind[:-1]}y" for kind in kinds if kind.endswith("_x") and f"{kind[:-1]}y" in kinds}
         columns = [(kind, pairs[kind]) if kind in pairs else (kind,) for kind in kinds if kind not in pairs.values()]
-        first = [(figures[f"{group[0]}.{column[0]}"], len(column)) for column in columns]
-        of_name = re.compile(rf" (of|at|in) ({re.escape(group[0])}|the rest of the body)(?!\w)")
+        first = [(figures[f"{full}.{column[0]}"], len(column)) for column in columns]
+        of_name = re.compile(rf" (of|at|in) ({re.escape(full)}|the rest of the body)(?!\w)")
         head = [f"{of_name.sub('', of['label'])[:-3 if count == 2 else None]} ({of['unit']})" for of, count in first]
         rows = []
         for name in group:
-            cells = [[figures[f"{name}.{kind}"] for kind in column] for column in columns]
+            cells = [[figures[f"{name}.{kind}"] for kind in column if kind in names[name]] for column in columns]
             # Figures without an extreme are coordinates of places, and lengths of the scene.
-            last = [_cell((of, of["value"]) for of in cell) if cell[0]["governing"] or any(of["value"] is None for of in cell)
-                    else placed([of["value"] for of in cell], results.size) for cell in cells]
+            last = [_cell((of, of["value"]) for of in cell)
+                    if not cell or cell[0]["governing"] or any(of["value"] is None for of in cell) else placed([of["value"] for of in cell], results.size) for cell in cells]
             extremes = [[(of, of["governing"]) for of in cell if of["governing"]] for cell in cells]
             most = [_cell((of, extreme["value"], is_flagged(of, extreme)) for of, extreme in cell) for cell in extremes]
             times = [", ".join(dict.fromkeys(f"{extreme['time']:g}" for _, extreme in cell)) for cell in extremes]
@@ -343,12 +347,25 @@ def write_pdf(path, results, arguments, everything):
         pages.text("\n".join(filter(None, (byline, subtitle, MODEL))))
         pages.text(ending, color=RED, weight="bold")
         errors = errors_of(summary)
-        pages.table("Body, materials, and estimated relative errors", body(results) + [("", "")] * bool(errors) + errors)
         is_many = len(results.summary.get("boundaries", {})) >= MANY
-        drawing.use(size=SIZE, width=FULL if is_many or pages.beside < 2.5 else pages.beside, height=HIGH if is_many else LOW)
-        draw["setting"](figure=pages)
+        drawing.use(size=LETTERS, width=FULL if is_many else BESIDE, height=HIGH if is_many else LOW)
+        if not is_many:
+            pages.aside()
+            draw["setting"](figure=pages)
+        pages.table("Body and materials", body(results))
+        pages.table("Estimated relative errors", errors)
         pages.new_line()
-        pages.table("Governing values", *governing(results))
+        if is_many:
+            draw["setting"](figure=pages)
+            pages.new_line()
+        rows, head = governing(results)
+        why = {}
+        if head[-1] == "why not determined":
+            for *row, reason_of in rows:
+                why.setdefault(reason_of, []).append(row[0])
+            rows, head = [row[:-1] for row in rows], head[:-1]
+        pages.table("Governing values", rows, head)
+        pages.text("\n".join(f"{', '.join(names)}: {text}" for text, names in why.items() if text))
         title = "Supports, probes, materials"
         for rows, head in by_name(results, with_places=False):
             pages.new_line()
@@ -356,20 +373,20 @@ def write_pdf(path, results, arguments, everything):
             title = ""
         pages.text("\n".join(f"Note: {note}" for note in summary.get("notes", [])))
         pages.new_line()
-        # Three plots stand beside each other.
-        third = (FULL - 2 * SPACE) / 3
-        drawing.use(width=third)
+        # Three plots stand beside each other. The pressure has the longest caption.
+        narrow = 0.3 * (FULL - 2 * SPACE)
+        drawing.use(width=narrow)
         draw["force-displacement"](figure=pages)
         draw["damage-history"](figure=pages)
-        drawing.use(width=third if len(results.curves) < 2 else FULL)
+        drawing.use(width=FULL - 2 * (narrow + SPACE) if len(results.curves) < 2 else FULL)
         draw["pressure"](figure=pages)
-        width, height = np.ptp(results.nodes, axis=0)
-        if pages.left < min(LEAST_MAPS, LEAST_LABELS + LEAST_BODY * height / width):
+        is_beside = pages.left >= LEAST_MAPS
+        if not is_beside:
             pages.next()
         pages.new_line()
         made = " · ".join(f"{name} {value}" for name, value in run_of(summary) + provenance(summary)[:-1])
         last = LINE * (len(wrapped(made, FULL, SIZE)) + 1)
-        drawing.use(width=FULL, height=pages.left - last - 0.4)
+        drawing.use(width=FULL, height=pages.left - last - 0.25, axes=not is_beside)
         draw_everything(results, limits_of([results]), pages)
         pages.text(made, color=FAINT)
 
@@ -379,7 +396,7 @@ def main(prog=None, description=__doc__, shown=None):
     parser = argparse.ArgumentParser(
         prog=prog, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", metavar="OUT", help="result folder")
-    parser.add_argument("--pdf", action="store_true", help="also report.pdf: two or three pages with values, maps and curves")
+    parser.add_argument("--pdf", action="store_true", help="also report.pdf: one to three pages with values, maps and curves")
     parser.add_argument("--title", help="default: that of the scene")
     parser.add_argument("--author", default="")
     parser.add_argument("--date", default="")

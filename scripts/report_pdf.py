@@ -11,18 +11,19 @@ from signorini_files import whole
 from table import text_of
 
 # A4, its margins, and the space between blocks, inches.
-WIDTH, HEIGHT, MARGIN, SPACE = 8.27, 11.69, 0.6, 0.15
+WIDTH, HEIGHT, MARGIN, SPACE = 8.27, 11.69, 0.5, 0.12
 FULL = WIDTH - 2 * MARGIN
 # The size of letters, points, and the height of a line, inches.
-SIZE, LINE = 8, 0.155
-# Tables that are wider than a page by up to this factor have smaller letters.
-WIDEST = 1.3
+SIZE, LINE = 7.5, 0.145
+# Tables that are wider than a page by up to this factor have smaller letters; and those beside a picture, by the second one.
+WIDEST, BESIDE = 1.3, 1.1
 # The least width of a last column of sentences, which is narrower in a wide table, inches.
 SENTENCES = 1.8
 
 
 class Pages:
-    """Pages of blocks that stand beside each other where there is room, and otherwise below each other."""
+    """Pages of blocks that stand beside each other where there is room, and otherwise below each other. A picture may stand at the
+    right margin, and the blocks that fit beside it."""
 
     def __init__(self, pdf):
         self.pdf, self.number = pdf, 0
@@ -31,6 +32,8 @@ class Pages:
     def start(self):
         """Starts a page."""
         self.x, self.y, self.bottom, self.number = MARGIN, MARGIN, MARGIN, self.number + 1
+        # The right end of blocks beside a picture at the margin, and the lower end of this.
+        self.right, self.until, self.is_aside = WIDTH - MARGIN, MARGIN, False
         self.figure = plt.figure(figsize=(WIDTH, HEIGHT))
 
     def end(self):
@@ -45,8 +48,13 @@ class Pages:
 
     def place(self, width, height):
         """The page and the upper left corner of a new block of this size."""
-        if self.x > MARGIN and self.x + width > WIDTH - MARGIN + 0.01:
+        if self.is_aside:
+            self.is_aside, self.right, self.until = False, WIDTH - MARGIN - width - SPACE, self.y + height + SPACE
+            return self.figure, self.right + SPACE, self.y
+        if self.x > MARGIN and self.x + width > MARGIN + self.room + 0.01:
             self.new_line()
+        if width > self.room + 0.01:
+            self.y = self.bottom = max(self.bottom, self.until)
         if self.y > MARGIN and self.y + height > HEIGHT - MARGIN + 0.01:
             self.next()
         x, y = self.x, self.y
@@ -57,15 +65,20 @@ class Pages:
         """The next block stands below all others."""
         self.x, self.y = MARGIN, self.bottom
 
+    def aside(self):
+        """The next block is a picture at the right margin."""
+        self.new_line()
+        self.is_aside = True
+
     @property
-    def beside(self):
-        """The width beside the last block."""
-        return WIDTH - MARGIN - self.x
+    def room(self):
+        """The width of the line."""
+        return (self.right if self.y < self.until - 0.01 else WIDTH - MARGIN) - MARGIN
 
     @property
     def left(self):
         """The height below all blocks of the page."""
-        return HEIGHT - MARGIN - self.bottom
+        return HEIGHT - MARGIN - max(self.bottom, self.until)
 
     def write(self, x, y, text, size=SIZE, **style):
         self.figure.text(x / WIDTH, 1.0 - y / HEIGHT, text, size=size, va="top", parse_math=False, **style)
@@ -87,11 +100,12 @@ class Pages:
         widths = [max(width_of(cell, SIZE) for cell in column) + 0.15 for column in columns]
         if head:
             widths = [max(width, min(width_of(name, SIZE) + 0.15, 1.0)) for width, name in zip(widths, head)]
-        widths[-1] = max(min(widths[-1], SENTENCES), widths[-1] - max(0.0, sum(widths) - FULL))
-        size = FULL / sum(widths) if FULL < sum(widths) <= WIDEST * FULL else 1.0
+        room = self.room if sum(widths) <= BESIDE * self.room else FULL
+        widths[-1] = max(min(widths[-1], SENTENCES), widths[-1] - max(0.0, sum(widths) - room))
+        size = room / sum(widths) if room < sum(widths) <= WIDEST * room else 1.0
         while columns:
             count = len(columns)
-            while count > 2 and size * sum(widths[:count]) > FULL + 1e-9:
+            while count > 2 and size * sum(widths[:count]) > room + 1e-9:
                 count -= 1
             self._part(title, columns[:count], widths[:count], head[:count], size)
             title = ""
@@ -104,7 +118,7 @@ class Pages:
         # The first line of each row.
         lines = np.cumsum([0] + [max(1, *map(len, row)) for row in zip(*cells)])
         first, above = 1.4 * LINE * bool(title), line * max(map(len, heads), default=0)
-        _, x, y = self.place(max(size * sum(widths), width_of(title, SIZE) * 1.4), first + above + lines[-1] * line)
+        _, x, y = self.place(max(size * sum(widths) - 0.1, width_of(title, SIZE) * 1.4), first + above + lines[-1] * line)
         self.write(x, y, title, size=1.2 * SIZE, weight="bold", color=INK)
         for k, (column, width) in enumerate(zip(cells, widths)):
             for number, text in enumerate(heads[k] if heads else ()):
