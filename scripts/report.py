@@ -22,7 +22,6 @@ from string import Template
 
 # This module comes first: it checks the memory before numpy is imported.
 import drawing
-import numpy as np
 from drawing import FAINT, RED, plt, wrapped
 from bars import barred, placed, plain
 from contact_pressure import draw_evolution

@@ -28,6 +28,7 @@ fn pictures_and_a_report_are_drawn_far_from_the_scripts() {
     assert_eq!(test_directory.say(&["report", "out/scene", "--pdf"]).code, Some(0));
     let pdf = std::fs::read(test_directory.path("out/scene/report.pdf")).expect("a PDF");
     assert!(pdf.starts_with(b"%PDF") && pdf.len() > 20_000);
+    assert_eq!(pdf.windows(12).filter(|of| of == b"/Type /Page ").count(), 1, "one page");
     let page = test_directory.read("out/scene/report.html");
     assert!(
         page.contains("small strains") && page.contains("without friction"),
@@ -148,9 +149,13 @@ fn a_body_without_damage_is_not_told_of_damage() {
     let said = directory.run(&sets(&["time.step='auto'", "output.times=[0.5]"]));
     assert!(said.out.contains("to t = 1 in steps that follow the loads"), "{}", said.out);
     assert!(!said.out.contains('ζ'), "{}", said.out);
-    if directory.say_python(&["plot", "out/scene", "--animate"]).is_none() {
-        return;
-    }
+    let pressure = ["plot", "out/scene", "--animate", "--only", "pressure"];
+    let Some(said) = directory.say_python(&pressure) else { return };
+    assert_eq!(said.out, "out/scene/pressure.png\nout/scene/pressure.gif\n");
+    directory
+        .say(&["plot", "out/scene", "--animate", "--only", "setting"])
+        .fails(2, &["--animate: --only has none of deformed, pressure, stress-damage; add one"]);
+    directory.say(&["plot", "out/scene", "--animate"]);
     let names = directory.names("out/scene");
     assert!(names.iter().any(|name| name == "stress.gif"), "{names:?}");
     assert!(!names.iter().any(|name| name.starts_with("damage")), "{names:?}");
@@ -357,6 +362,78 @@ fn a_flat_foundation_stays_at_its_place_under_a_magnified_body() {
     assert_eq!(said, "True 0.0 5 True\nTrue 0.0 5 True\n");
 }
 
+/// A node of a curved foundation is drawn not farther from the node that touches it than this has slid, also where coordinates have
+/// more than twelve decimals.
+#[test]
+fn a_magnified_body_touches_its_curved_foundation() {
+    let directory = TestDirectory::new();
+    directory.write("square.msh", &square(7));
+    directory.run(&["--set", "boundary.bottom.gap='0.001*x^2'", "--set", "damage.lambda_u=0"]);
+    let draws = "import numpy as np\n\
+         results = read_results(Path('out/scene'))\n\
+         line, = results.foundation(20.0)\n\
+         touching = results.places(20.0)[(results.nodes[:, 1] == 0.0) & (results.gap == 0.0)]\n\
+         far = np.linalg.norm(touching[:, None] - line, axis=2).min(axis=1)\n\
+         print(len(line), len(touching), far.max() <= 1.001 * results.displacement[:, 0].max())";
+    let Some(said) = python(&directory, draws) else { return };
+    assert_eq!(said, "8 8 True\n");
+}
+
+/// The captions of a zoom are about the part that it shows, and its lines end where it ends.
+#[test]
+fn a_zoom_has_its_own_extremes() {
+    let directory = TestDirectory::new();
+    let scene = directory.read("scene.toml").replace("\"-3*t\"", "\"-3*t*x\"");
+    directory.write("scene.toml", &scene);
+    directory.run(&["--set", "discretisation.displacement=2"]);
+    let draws = "import drawing, numpy as np\n\
+         from limits import limits_of\n\
+         from plot import PICTURES\n\
+         zoom = [[0.0, 0.5], [0.5, 1.0]]\n\
+         drawing.use(zoom=zoom)\n\
+         results = read_results(Path('out/scene'), zoom=zoom)\n\
+         x, y = results.places(results.factor).T\n\
+         part = (x <= 0.5) & (x >= 0.0) & (y >= 0.5) & (y <= 1.0)\n\
+         maps = PICTURES['stress-damage'](results, limits_of([results]))\n\
+         largest = f'{results.von_mises[part].max():.3g}'\n\
+         print(f'largest {largest}' in maps.axes[0].get_title('left'), results.von_mises[part].max() < 2.0)\n\
+         lines = [of for axes in PICTURES['principal-stresses'](results, None).axes for of in axes.lines if len(of.get_xdata()) > 50]\n\
+         print(len(lines) > 0, all(of.get_clip_box() is of.axes.bbox for of in lines))";
+    let Some(said) = python(&directory, draws) else { return };
+    assert_eq!(said, "True True\nTrue True\n");
+}
+
+/// Far from the origin a displacement is no rounding error, places have the digits of the body, and axes count from near.
+#[test]
+fn a_body_far_from_the_origin_has_displacements_and_places() {
+    let directory = TestDirectory::new();
+    let text = square(4);
+    let (head, rest) = text.split_once("$Nodes").expect("nodes");
+    let (nodes, tail) = rest.split_once("$EndNodes").expect("their end");
+    let moved = nodes.lines().map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+        [x, y, "0"] => format!("{} {y} 0\n", 1e6 + x.parse::<f64>().expect("a number")),
+        _ => format!("{line}\n"),
+    });
+    let moved: String = moved.collect();
+    directory.write("square.msh", &format!("{head}$Nodes{moved}$EndNodes{tail}"));
+    directory.run(&["--set", "boundary.top.traction=[0, '-0.003*t*(x - 999999)']"]);
+    let draws = "from drawing import along\n\
+         from limits import limits_of\n\
+         from maps import draw_deformed\n\
+         from report import governing\n\
+         results = read_results(Path('out/scene'))\n\
+         print(draw_deformed(results, limits_of([results])).axes[0].get_xlabel())\n\
+         print(along(results.curves[0].points, results.units)[1])\n\
+         rows = {row[0]: row for row in governing(results)[0]}\n\
+         print(float(rows['largest displacement'][1]) > 3e-5, '(1000001, 1)' in rows['largest displacement'])";
+    let Some(said) = python(&directory, draws) else { return };
+    let expected = "x − 1000000 (m)\nx − 1000000 (m) along y = 0\nTrue True\n";
+    assert_eq!(said, expected);
+    let places = ["table", "out/scene", "--columns", "bottom.contact_start_x,bottom.peak_x"];
+    let said = directory.say(&places).out;
+    assert!(said.contains(" 1000000 ") && said.contains(" 1000001 "), "{said}");
+}
+
 #[test]
 fn maps_of_a_part_and_of_several_times_are_drawn_and_removed() {
     let directory = TestDirectory::new();
@@ -373,7 +450,7 @@ fn maps_of_a_part_and_of_several_times_are_drawn_and_removed() {
         .fails(2, &["--zoom: the maps show nothing there; they are within"]);
     directory.say(&["plot", "out/scene", "--along", "bottom,top", "--quantity", "stress_yy"]);
     let rows = directory.read("out/scene/curves_along_bottom,top_stress_yy.csv");
-    assert!(rows.starts_with("run,boundary,time,s,stress_yy"), "{rows}");
+    assert!(rows.starts_with("run,boundary,time (s),s (m),stress_yy (Pa)"), "{rows}");
     directory.run(&[]);
     assert!(!directory.names("out/scene").iter().any(|name| name.ends_with(".png")));
 }

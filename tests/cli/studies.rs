@@ -77,22 +77,28 @@ fn a_study_varies_constants_and_cases_have_labels() {
     let text = text
         + "\n[constants]\nload = '2*v'\nv = 1\nE = 10\n[[probe]]\nname = 'p'\npoint = ['v/4', 0.5]\n";
     directory.write("scene.toml", &text);
-    let study = |words: &[&str]| {
+    let study_in = |out: &str, words: &[&str]| {
         let words =
-            [&["study", "scene.toml", "--columns", "displacement_max", "--out", "out/s"], words]
+            [&["study", "scene.toml", "--columns", "displacement_max", "--out", out], words]
                 .concat();
         directory.say_python(&words)
     };
+    let study = |words: &[&str]| study_in("out/s", words);
     let Some(said) = study(&["--set", "v=1,2", "--set", "constants.E=10"]) else { return };
     assert_eq!(said.code, Some(0), "{said:?}");
-    let rows = || {
-        let table = directory.read("out/s/study.csv");
+    let rows_in = |out: &str| {
+        let table = directory.read(&format!("{out}/study.csv"));
         let head = table.lines().next().expect("a head").to_owned();
         let cells = table.lines().skip(1).map(|row| row.split(',').map(str::to_owned).collect());
         (head, cells.collect::<Vec<Vec<String>>>())
     };
-    let (head, cells) = rows();
+    let (head, cells) = rows_in("out/s");
     assert!(head.starts_with("run,v,displacement_max"), "{head}");
+    // The axis of a picture says that the key is a constant.
+    let figure = ["plot", "out/s", "--figure", "displacement_max", "--format", "svg"];
+    assert_eq!(directory.say(&figure).code, Some(0));
+    let picture = directory.read("out/s/curves_displacement_max.svg");
+    assert!(picture.contains("over constant v"), "no name of the axis");
     assert_eq!([&cells[0][0], &cells[1][0]], ["v=1__E=10", "v=2__E=10"]);
     // A wrong column is named as soon as there is a run, and again at the end.
     let wrong = ["--set", "v=1,2", "--set", "constants.E=10", "--columns", "displacment_max"];
@@ -116,12 +122,18 @@ fn a_study_varies_constants_and_cases_have_labels() {
     assert!(page.contains("E = 80 Pa"), "the value, not the name");
 
     directory.write("cases.csv", "label,v,constants.E\nsoft one,,5\nstiff,2,\n");
-    let said = study(&["--cases", "cases.csv"]).expect("Python");
+    // The table of another study is not replaced.
+    let before = directory.read("out/s/study.csv");
+    let refused = study(&["--cases", "cases.csv"]).expect("Python");
+    refused.fails(2, &["out/s/study.csv is the table of another study, of v=1__E=10; choose"]);
+    assert_eq!(directory.read("out/s/study.csv"), before);
+    let said = study_in("out/cases", &["--cases", "cases.csv"]).expect("Python");
     assert_eq!(said.code, Some(0), "{said:?}");
-    let (head, cells) = rows();
+    let (head, cells) = rows_in("out/cases");
     assert!(head.starts_with("run,constants.E,v,displacement_max"), "{head}");
     assert_eq!([&cells[0][0], &cells[1][0]], ["soft_one", "stiff"]);
-    let said = study(&["--cases", "cases.csv", "--set", "time.step=0.5,1"]).expect("Python");
+    let steps = ["--cases", "cases.csv", "--set", "time.step=0.5,1"];
+    let said = study_in("out/steps", &steps).expect("Python");
     assert!(said.code == Some(0) && said.out.contains("stiff__step=0.5"), "{said:?}");
     directory.write("cases.csv", "label,v\nsoft,1\nsoft,2\n");
     let said = study(&["--cases", "cases.csv"]).expect("Python");
@@ -138,7 +150,12 @@ fn a_study_is_drawn_over_its_values() {
     let study = ["study", "scene.toml", "--out", "out/s", "--plot", "work,bottom.force_y"];
     let sets =
         ["--set", "material.poisson=0.3,0.7,0.1", "--set", "boundary.top.traction=[0, -1],[0, -3]"];
-    let Some(said) = directory.say_python(&[&study[..], &sets].concat()) else { return };
+    // A wrong name is refused before there are runs.
+    let wrong = [&study[..4], &["--plot", "botom.force_y"], &sets[..]].concat();
+    let Some(said) = directory.say_python(&wrong) else { return };
+    said.fails(2, &["botom.force_y is no figure of scene.toml; did you mean bottom.force_y?"]);
+    assert!(!directory.path("out/s").exists());
+    let said = directory.say(&[&study[..], &sets].concat());
     assert_eq!(said.code, Some(1), "{said:?}");
     assert!(said.err.contains("lack the failed runs poisson=0.7"), "{said:?}");
     for name in ["work", "bottom.force_y"] {
@@ -159,6 +176,8 @@ fn a_study_is_drawn_over_its_values() {
         2,
         &["--over material.young: the runs do not differ in it; choose material.poisson"],
     );
+    let one = directory.say(&["plot", "out/s/poisson=0.3__traction=_0__-1_", "--figure", "work"]);
+    assert!(one.err.contains("have one value of run; figures of a run in time:"), "{one:?}");
     let wrong = directory.say(&["plot", "out/s", "--figure", "wrok"]);
     wrong.fails(2, &["no summary has wrok; did you mean work"]);
     // The table of the study's folder is that of its runs.
@@ -361,6 +380,7 @@ fn curves_and_the_python_module_give_the_exact_fields() {
          print(abs(strain[:2]/u[2] - 1).max() < 1e-5, strain[2], frame.gradient((0.3, 0), 'zeta').shape)\n\
          again = run('scene.toml', out='out/stiff', material={{'young': 160}})\n\
          print(again.figures['displacement_max']['value'] < results.figures['displacement_max']['value'])\n\
+         print(results.plot('von_mises', factor=20).get_title())\n\
          frame.to_gmsh('frame.msh')"
     );
     let python = std::env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned());
@@ -371,7 +391,7 @@ fn curves_and_the_python_module_give_the_exact_fields() {
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
     assert_eq!(
         String::from_utf8_lossy(&ran.stdout),
-        "1.0 True 1.0\nTrue True 11\nTrue (3,)\nTrue nan (2,)\nTrue\n"
+        "1.0 True 1.0\nTrue True 11\nTrue (3,)\nTrue nan (2,)\nTrue\nt = 1 s, displacements × 20\n"
     );
     let frame = directory.path("frame.msh");
     let read = Command::new("gmsh").arg("-check").arg(frame).output().expect("gmsh").stdout;
