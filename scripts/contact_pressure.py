@@ -3,8 +3,8 @@
 import numpy as np
 
 from drawing import (
-    AROUND_PLOTS, BAR, BLUE, FAINT, NARROWEST, OPTIONS, RED, along, canvas, colours, draw_colourbar, em, headline, legend,
-    power_of, room_for_legend, stress_unit, times_power, wide,
+    AROUND_PLOTS, BAR, BLUE, FAINT, LINE, NARROWEST, OPTIONS, RED, along, canvas, colours, draw_colourbar, em, headline, legend,
+    power_of, room_for_legend, stress_unit, times_power, wide, wrapped,
 )
 
 # The least width of a panel, in the size of letters; panels of many boundaries stand in several rows.
@@ -28,7 +28,8 @@ def draw_pressure(results, limits, figure=None):
     high = max(min(3.0, 0.42 * width, OPTIONS.height) if lines == 1 else 0.0, 10.0 * em())
     pressure, gap = 0.7 * high, 0.3 * high
     columns = [(left, panel, right)] + [(0.0, panel, right)] * (count - 1)
-    rows = [(top, pressure, 1.8 * em()), (0.0, gap, bottom)] * lines
+    labels = [wrapped(along(curve.points, results.units)[1], panel + 0.5 * right) for curve in curves]
+    rows = [(top, pressure, 1.8 * em()), (0.0, gap, bottom + LINE * em() * (max(map(len, labels)) - 1))] * lines
     # A row of titles, and one without.
     names = [name for k in range(lines) for name in (_names(curves)[k * count:(k + 1) * count] + [""] * count)]
     factor, unit = stress_unit(limits.pressure, results.units)
@@ -40,7 +41,7 @@ def draw_pressure(results, limits, figure=None):
     for k, (curve, bar) in enumerate(zip(curves, bars)):
         above, below = (axes[(2 * (k // count) + part) * count + k % count] for part in (0, 1))
         _draw_curve(above, below, curve, factor, 10.0**power, panel, bar / factor, highest)
-        below.set_xlabel(along(curve.points, results.units)[1])
+        below.set_xlabel("\n".join(labels[k]))
         above.tick_params(labelbottom=False, labelleft=k % count == 0)
         below.tick_params(labelleft=k % count == 0)
         _scale(above, highest)

@@ -35,6 +35,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from bars import placed
+from signorini_results import SLENDER
 
 if LIMIT != resource.RLIM_INFINITY:
     # OpenBLAS keeps the buffer that it allocates here, before the results take the memory.
@@ -69,8 +70,8 @@ OPTIONS = SimpleNamespace(width=None, size=None, height=7.0, titles=True, head=T
                           range=None, zoom=None)
 # Coordinates that are so many times farther from 0 than from each other count from a near origin.
 DISTANT = 1e3
-# Maps of bodies whose sides have a ratio above the first are stretched across, to about the second.
-SLENDER, STRETCHED = 30.0, 15.0
+# Maps of slender bodies are stretched across, to about this ratio of the sides.
+STRETCHED = 15.0
 # The height of a line of text, and the places around the axes of maps and of plots for ticks and labels (left, right,
 # top, bottom), in the size of letters. They fit numbers of six digits.
 LINE = 1.35

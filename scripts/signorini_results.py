@@ -51,6 +51,8 @@ STRAINS = {"strain_xx": (0, 0), "strain_yy": (1, 1), "strain_xy": (0, 1)}
 WRITTEN = b"$Comments\nA frame of signorini.\n$EndComments\n"
 # The colours of a picture leave out a peak: values on this part of the area, if the largest one is so many times the others.
 PEAK_PART, PEAK = 0.005, 4.0
+# Bodies whose sides have a larger ratio are not drawn to scale.
+SLENDER = 30.0
 # A point is in a triangle if its barycentric coordinates are not smaller.
 OUTSIDE = -1e-9
 # The largest number of pairs of points and triangles that are tried at once.
@@ -349,8 +351,11 @@ class Plot:
         label = "damage 1 − ζ" if name == "damage" else f"{name} ({self.units[unit]})" if unit else name
         axes.figure.colorbar(axes.tripcolor(*points.T, corners, values, **style), ax=axes, label=label,
                              extend="max" if values.max() > style["vmax"] else "neither")
-        axes.set(aspect="equal", xlabel=f"x ({self.units['length']})", ylabel=f"y ({self.units['length']})",
-                 title=f"t = {frame.time:g} {self.units['time']}" + f", displacements × {factor:g}" * bool(factor))
+        extent = np.ptp(frame.points, axis=0)
+        is_slender = extent.max() > SLENDER * extent.min()
+        axes.set(aspect="auto" if is_slender else "equal", xlabel=f"x ({self.units['length']})", ylabel=f"y ({self.units['length']})",
+                 title=f"t = {frame.time:g} {self.units['time']}" + f", displacements × {factor:g}" * bool(factor)
+                 + ", not to scale" * is_slender)
         return _plain(axes)
 
     def pressure(self, time=None, axes=None):

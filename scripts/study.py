@@ -7,7 +7,8 @@ table.
 
 Each row of cases.csv is a run; the columns are keys or names of constants, and an empty cell leaves a key as it is.
 Each run has a folder below OUT, named by its values, or by the column `label`; OUT/study.csv is the table. A study
-that was interrupted goes on: runs that are complete are not repeated, unless the scene or its files have changed.
+that was interrupted goes on: runs that are complete are not repeated, unless the scene or its files have changed. Another
+study needs another OUT.
 Studies with the same OUT, also on several machines, divide the runs: each waits at its end for those that another has
 started. Runs write no frames (output.every = 0), unless --frames or a --set asks for them; those of one run are made
 by `signorini run OUT/NAME/scene.toml --set output.every=1`. A list is split at commas outside brackets and quotes.
