@@ -136,7 +136,7 @@ def figures(binary, out):
 
 
 def table_1(rows, out):
-    """Table 1 as CSV, and for LaTeX as the paper has it, with the printed value in brackets behind each of ours."""
+    """Table 1 as CSV, and for LaTeX as the paper has it, with the printed value in brackets behind each of ours; 150 mm wide."""
     rows = [{key: row[key] for key in ("h", "k", "sum", "printed")} for row in rows if row["printed"]]
     write_table(rows, out / "table-1.csv")
     steps = sorted({row["k"] for row in rows}, reverse=True)
@@ -144,7 +144,8 @@ def table_1(rows, out):
     lines = [[rf"\num{{{np.sqrt(2.0) / h:.0f}}}", *(cells.get((h, k), "") for k in steps)]
              for h in sorted({row["h"] for row in rows}, reverse=True)]
     text = latex.tabular(["$n$", *(rf"$k = \num{{{k:g}}}$" for k in steps)], lines)
-    (out / "table-1.tex").write_text(text + "\n", encoding="utf-8")
+    style = r"{\footnotesize\setlength{\tabcolsep}{3pt}\sisetup{group-digits = none}%"
+    (out / "table-1.tex").write_text(f"{style}\n{text}}}\n", encoding="utf-8")
     print(out / "table-1.csv", out / "table-1.tex", sep="\n")
 
 
