@@ -35,7 +35,7 @@ RUNS = {
 CAPTIONS = {
     1: "A frictionless contact problem between an elastic body and a rigid obstacle.",
     2: "Example I: physical setting, and mesh for n = 8.",
-    3: "Example I: the error against h + k, in the norm of Corollary 7.",
+    3: "Example I: the error against h + k, in the norm of Corollary 7 (dots: ours; crosses: printed).",
     4: "Example II: contact problem of an L-shaped domain.",
     5: "Example II: deformed mesh (× 10) and initial configuration.",
     6: "Example II: von Mises stress and damage field ζ (1: sound) at the final time.",
