@@ -194,7 +194,7 @@ class Map:
 
 def draw_maps(maps, caption, units, figure=None, below=0.0):
     """A picture of maps with one scale, in that number of columns in which they are largest."""
-    left, right, top, bottom = (em() * of for of in (AROUND_MAPS if OPTIONS.axes else [0.6] * 4))
+    left, right, top, bottom = (em() * of for of in (AROUND_MAPS if OPTIONS.axes else (0.6, 0.6, 0.6, 1.0)))
     right = BAR * em() if any(of.has_bar for of in maps) else right
     is_field = all(of.is_field for of in maps)
     boxes = [_with_margin(of.box) if OPTIONS.zoom is None or not is_field else np.array(OPTIONS.zoom) for of in maps]
@@ -410,6 +410,11 @@ def legend(axes, below, lower=0.0, **style):
     axes.legend(loc="upper left", bbox_to_anchor=(left / size[0], -(3.8 * em() + lower) / size[1]), ncols=columns,
                 borderaxespad=0.0, borderpad=0.0, fontsize="small", labelspacing=0.3, handletextpad=0.8,
                 columnspacing=1.0, **{"handlelength": 1.6, **style})
+
+
+def few_ticks(axes):
+    """Lets an axis x have about five ticks, and fewer in a narrow plot."""
+    axes.locator_params("x", nbins=int(np.clip(_size_of(axes)[0] / (4.0 * em()), 1, 5)))
 
 
 def drawn_ticks(axis, ticks):

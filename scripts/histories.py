@@ -3,7 +3,7 @@
 import numpy as np
 
 from drawing import (
-    AROUND_PLOTS, BLUE, FAINT, OPTIONS, RED, canvas, colours, em, headline, legend, plot, power_of, room_for_legend,
+    AROUND_PLOTS, BLUE, FAINT, OPTIONS, RED, canvas, colours, em, few_ticks, headline, legend, plot, power_of, room_for_legend,
     times_power,
 )
 from driven import driven_boundary
@@ -30,7 +30,7 @@ def draw_damage_history(results, _limits=None, figure=None):
         axes.axvline(stopped, color=RED, linewidth=1.0, linestyle=(0, (4, 2)), label=labels[2])
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(left=0.0)
-    axes.locator_params("x", nbins=5)
+    few_ticks(axes)
     axes.set_xlabel(f"time t ({results.units['time']})")
     axes.set_ylabel(f"damage 1 − ζ{times_power(power)}")
     legend(axes, below)
@@ -73,7 +73,7 @@ def draw_forces(runs, names, figure=None):
         axes.axhline(0.0, color=FAINT, linewidth=0.7)
     else:
         axes.set_ylim(bottom=0.0)
-    axes.locator_params("x", nbins=5)
+    few_ticks(axes)
     axes.set_xlabel(label + times_power(across, unit))
     axes.set_ylabel(f"force{times_power(up, runs[0].units['line'])}")
     legend(axes, below)

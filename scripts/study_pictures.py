@@ -67,8 +67,8 @@ def draw_studies(folders, summaries, names, target, over=None, settings=None, fo
     key = over or next(iter(keys), "run")
     others = [name for name in keys if name != key]
     if len({of.get(key) for of in settings}) == 1 and key != "run" or len(folders) == 1:
-        print(f"note: the pictures have one value of {key}; figures of a run in time: `signorini plot {folders[0]} --only "
-              "force-displacement`, also with --abscissa COLUMN, and history.csv", file=sys.stderr)
+        print(f"note: one {key if key == 'run' else f'value of {key}'} makes a single dot; figures of a run in time: `signorini plot "
+              f"{folders[0]} --only force-displacement`, also with --abscissa COLUMN, and history.csv", file=sys.stderr)
     if failed:
         print(f"note: the pictures lack the failed runs {', '.join(failed)}", file=sys.stderr)
     for name, (table, *pictures) in paths_of(target, names, formats).items():

@@ -177,7 +177,7 @@ fn a_study_is_drawn_over_its_values() {
         &["--over material.young: the runs do not differ in it; choose material.poisson"],
     );
     let one = directory.say(&["plot", "out/s/poisson=0.3__traction=_0___-1_", "--figure", "work"]);
-    assert!(one.err.contains("have one value of run; figures of a run in time:"), "{one:?}");
+    assert!(one.err.contains("one run makes a single dot; figures of a run in time:"), "{one:?}");
     let wrong = directory.say(&["plot", "out/s", "--figure", "wrok"]);
     wrong.fails(2, &["no summary has wrok; did you mean work"]);
     // The table of the study's folder is that of its runs.
