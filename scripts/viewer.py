@@ -80,7 +80,7 @@ def about(results, everything, limits, origin):
     """What the viewer must know besides the fields; places are relative to `origin`."""
     units, number = results.units, {point: k for k, point in enumerate(map(tuple, results.nodes.tolist()))}
     factor, unit = stress_unit(limits.stress, units)
-    is_damaged = "damage" in results.scene
+    left_out = ("damage", "zeta") * ("damage" not in results.scene) + ("stress_zz",) * (results.scene["material"]["plane"] == "stress")
     gaps = np.concatenate([curve.gap for state in everything for curve in state.curves] or [np.zeros(1)])
     colours = boundary_colours(results)
     return {
@@ -89,7 +89,7 @@ def about(results, everything, limits, origin):
         "origin": origin.tolist(), "box": (limits.box - origin).tolist(), "automatic": limits.factor,
         "materialNames": [results.surface(name) for name in results.material_names] if results.materials is not None else ["body"],
         "fields": {key: dict(zip(("label", "kind", "colours"), of)) for key, of in FIELDS.items()
-                   if is_damaged or key not in ("damage", "zeta")},
+                   if key not in left_out},
         "units": {"stress": {"name": unit, "factor": factor}, "length": {"name": units["length"], "factor": 1},
                   "none": {"name": "", "factor": 1}},
         "colours": {name: np.round(255 * matplotlib.colormaps[name](np.arange(256))[:, :3]).astype(int).tolist()
@@ -102,7 +102,8 @@ def about(results, everything, limits, origin):
         "peak": {"part": PEAK_PART, "factor": PEAK, "singular": SINGULAR_PEAK},
         "topPressure": limits.pressure if results.curves else 0, "stressTop": limits.stress, "largestLoad": limits.load,
         "leastGap": float(gaps.min()), "largestGap": float(gaps.max()),
-        "frames": [{"moment": state.moment, "loads": loads(state, origin), "foundation": foundation(state, origin, limits.factor)}
+        # A static solve has no other time.
+        "frames": [{"moment": state.moment * (len(results.frames) > 1), "loads": loads(state, origin), "foundation": foundation(state, origin, limits.factor)}
                    for state in everything],
     }
 

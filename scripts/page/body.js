@@ -25,7 +25,7 @@ const PLAIN = [COLOURED[0], `#version 300 es
 class Body {
   constructor(canvas, run) {
     // The edges of the body are vectors above it, and smooth; without a graphics card smoothing takes three times as long.
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false });
     if (!gl) throw new Error("this browser has no WebGL 2, which the viewer needs");
     Object.assign(this, { gl, run, canvas });
     this.coloured = libraries.createProgramInfo(gl, COLOURED);
@@ -73,31 +73,31 @@ class Body {
     return run.triangles.filter((_, k) => run.materials[run.elementOf(Math.floor(k / 3))] === material);
   }
 
-  // Pairs of nodes, each once; a side of an element of six nodes has two parts.
+  // Pairs of nodes; a side of an element of six nodes has two parts. Elements go counterclockwise, so two of them have a
+  // side in both directions; that of the boundary is in the overlay.
   sidesOf(material) {
-    const { run } = this, keys = new Float64Array(run.order * run.size);
+    const { run } = this, found = new Uint32Array(2 * run.order * run.size);
     const around = run.order === 3 ? [0, 1, 2, 0] : [0, 3, 1, 4, 2, 5, 0];
     let count = 0;
     for (let e = 0; e < run.size; e++) {
       if (material >= 0 && run.materials[e] !== material) continue;
       for (let k = 0; k < run.order; k++) {
         const [a, b] = [run.elements[run.order * e + around[k]], run.elements[run.order * e + around[k + 1]]];
-        keys[count++] = Math.min(a, b) * run.count + Math.max(a, b);
+        if (a < b) [found[count++], found[count++]] = [a, b];
       }
     }
-    const sides = keys.subarray(0, count).sort().filter((key, k, all) => k === 0 || key !== all[k - 1]);
-    return Uint32Array.from({ length: 2 * sides.length }, (_, k) => k % 2 ? sides[k >> 1] % run.count : sides[k >> 1] / run.count);
+    return found.subarray(0, count);
   }
 
   // Draws the body as `view` shows it.
-  draw({ centre, zoom, width, height, factor, material, mesh, colours, bands, range }) {
-    const { gl } = this, density = window.devicePixelRatio || 1;
-    this.canvas.width = Math.round(width * density);
-    this.canvas.height = Math.round(height * density);
+  draw({ centre, zoom, stretch, width, height, factor, material, colours, bands, range }, mesh) {
+    const { gl } = this, pixels = [width, height].map(of => Math.round(of * (window.devicePixelRatio || 1)));
+    // A new size makes new buffers.
+    ["width", "height"].forEach((name, k) => { if (this.canvas[name] !== pixels[k]) this.canvas[name] = pixels[k]; });
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    const where = { centre, scale: [2 * zoom / width, 2 * zoom / height], factor };
+    const where = { centre, scale: [2 * zoom * stretch[0] / width, 2 * zoom * stretch[1] / height], factor };
     this.part(this.coloured, this.indexed("triangles", material), gl.TRIANGLES,
       { ...where, low: range.low, high: range.high, bands, table: this.tables[colours] });
     if (mesh) this.part(this.plain, this.indexed("sides", material), gl.LINES, { ...where, ink: [0, 0, 0, 0.25] });

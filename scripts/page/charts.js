@@ -5,7 +5,7 @@ class Chart {
   constructor(place, abscissa, names, scales) {
     this.place = place;
     const colours = [BLUE, RED];
-    const axis = { stroke: INK, grid: { stroke: "#eceff2" }, size: 64, values: (_, ticks) => ticks.map(tick => short(tick)) };
+    const axis = { stroke: INK, grid: { stroke: "#eceff2" }, size: place.clientWidth < 400 ? 52 : 64, values: (_, ticks) => ticks.map(tick => short(tick)) };
     this.plot = new libraries.uPlot({
       width: this.width(), height: 240, cursor: { drag: { x: true, y: false } },
       scales: { x: { time: false }, ...Object.fromEntries(scales.map((range, k) => [`y${k}`, range ? { range } : {}])) },

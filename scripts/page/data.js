@@ -47,21 +47,22 @@ class Run {
     [run.x, run.y] = [0, 1].map(axis => Float32Array.from({ length: run.count }, (_, k) => run.nodes[2 * k + axis]));
     run.elements = new Uint32Array(mesh, 8 * run.count, run.order * run.size);
     run.materials = new Uint32Array(mesh, 8 * run.count + 4 * run.order * run.size, run.size);
-    for (const [k, frame] of run.frames.entries()) {
-      const values = new Float32Array(await unpacked(`frame${k}`));
-      frame.columns = {};
-      COLUMNS.forEach((name, c) => { frame.columns[name] = values.subarray(c * run.count, (c + 1) * run.count); });
-      // Pressures and gaps at the nodes of all curves of Γ_C, one curve after the other.
-      let at = COLUMNS.length * run.count;
-      frame.contact = run.curves.map(curve => {
-        const [n, first] = [curve.nodes.length, at];
-        at += 2 * n;
-        return { pressure: values.subarray(first, first + n), gap: values.subarray(first + n, at) };
-      });
-    }
+    await run.readFrame(run.frames.length - 1);
     run.triangles = run.cut();
     run.sample();
     return run;
+  }
+
+  async readFrame(k) {
+    const values = new Float32Array(await unpacked(`frame${k}`)), columns = {}, { count } = this;
+    COLUMNS.forEach((name, c) => { columns[name] = values.subarray(c * count, (c + 1) * count); });
+    // Pressures and gaps at the nodes of all curves of Γ_C, one curve after the other.
+    let at = COLUMNS.length * count;
+    const contact = this.curves.map(({ nodes: { length: n } }) => {
+      at += 2 * n;
+      return { pressure: values.subarray(at - 2 * n, at - n), gap: values.subarray(at - n, at) };
+    });
+    Object.assign(this.frames[k], { columns, contact });
   }
 
   // Flat triangles: an element of six nodes is cut into four.
@@ -130,8 +131,10 @@ class Run {
     const { low, high, least, largest } = found;
     if (high - least <= peak * (high - low)) found.low = least;
     if (largest - low <= peak * (high - low)) found.high = largest;
-    // Colours begin at 0 if that is near.
-    if (found.low > 0 && found.low < 0.2 * found.high) found.low = 0;
+    // Colours begin at 0 if that is near, or if the field has one value.
+    const isFlat = found.high - found.low <= 1e-6 * Math.max(Math.abs(found.low), Math.abs(found.high));
+    if (found.low > -1e-3 * found.high && found.low < 0.2 * found.high || isFlat && found.low > 0) found.low = 0;
+    else if (isFlat && found.high < 0) found.high = 0;
     return found;
   }
 
@@ -153,6 +156,16 @@ class Run {
   places(frame, factor) {
     const { u_x: u, u_y: v } = this.frames[frame].columns;
     return this.nodes.map((x, k) => x + factor * (k % 2 ? v : u)[k >> 1]);
+  }
+
+  // The lower left and the upper right corner around the nodes, displaced `factor` times in a frame.
+  corners(frame, factor) {
+    const found = [[Infinity, Infinity], [-Infinity, -Infinity]];
+    this.places(frame, factor).forEach((x, k) => {
+      found[0][k % 2] = Math.min(found[0][k % 2], x);
+      found[1][k % 2] = Math.max(found[1][k % 2], x);
+    });
+    return found;
   }
 
   // Σ N_i(λ) v_i with the Lagrange functions N_i of the element.

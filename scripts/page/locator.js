@@ -1,13 +1,9 @@
 // Finds the flat triangle around a point, by a grid of cells with lists of the triangles that may meet them.
 class Locator {
-  // `places` are the nodes, x and y in turn.
-  constructor(run, places) {
-    const { triangles } = run, count = triangles.length / 3;
-    Object.assign(this, { run, places, low: [Infinity, Infinity], high: [-Infinity, -Infinity] });
-    places.forEach((x, k) => {
-      this.low[k % 2] = Math.min(this.low[k % 2], x);
-      this.high[k % 2] = Math.max(this.high[k % 2], x);
-    });
+  // The nodes are displaced `factor` times in a frame.
+  constructor(run, frame, factor) {
+    const { triangles } = run, count = triangles.length / 3, [low, high] = run.corners(frame, factor);
+    Object.assign(this, { run, places: run.places(frame, factor), low, high });
     const [width, height] = [0, 1].map(k => this.high[k] - this.low[k]);
     this.cell = Math.sqrt(width * height / count) || 1;
     this.across = Math.ceil(width / this.cell) + 1;

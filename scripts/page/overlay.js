@@ -5,9 +5,20 @@ const SVG = {
     `<polyline fill="none" points="${points.map(p => p.map(x => x.toFixed(1)).join(",")).join(" ")}" ${style}/>`,
   text: ([x, y], words, style = "") =>
     `<text x="${x.toFixed(1)}" y="${y.toFixed(1)}" ${style}>${SVG.escaped(words)}</text>`,
+  polygon: (points, fill) => `<polygon points="${points.map(p => p.map(x => x.toFixed(2)).join(",")).join(" ")}" fill="${fill}"/>`,
+  // The width of words of the weight `font`, pixels.
+  wide(words, font = "400") {
+    this.pen ??= document.createElement("canvas").getContext("2d");
+    this.pen.font = `${font} 12px sans-serif`;
+    return this.pen.measureText(words).width;
+  },
   escaped: words => String(words).replace(/[&<>"]/g, letter => `&#${letter.charCodeAt(0)};`),
 };
 const OPEN_END = 12; // pixels of the arrow ends of the colour bar
+const TALL = 15; // pixels of the height of a line of text
+const CLOSE = 9; // pixels; arrows that are closer than this to the one before are left out
+// Where a label is tried: directions from its point, and distances, pixels; a far one has a line to its point.
+const AROUND = [[1, 0], [-1, 0], [1, -1], [1, 1], [-1, -1], [-1, 1], [0, -1], [0, 1]], DISTANCES = [7, 13, 24, 40, 60, 90], FAR = 20;
 
 // A number with four digits, or fewer if the last ones are below a millionth of `scale`.
 function short(value, scale = 0) {
@@ -47,8 +58,41 @@ class Overlay {
   // The SVG elements for a view, which has the function `screen` from places to pixels.
   draw(view) {
     const parts = [this.foundation, this.outline, this.supports, this.directions, this.pressure, this.loads, this.marks,
-      this.cut, this.colourBar, this.scale];
+      this.cut, this.colourBar, this.scale, this.labels];
+    Object.assign(this, { taken: [], asked: [] });
     return parts.map(part => part.call(this, view)).join("");
+  }
+
+  // Words whose place is fixed, at the end of a line if `isRight`.
+  fixed([x, y], words, isRight = false, font = "400") {
+    const wide = SVG.wide(words, font), left = isRight ? x - wide : x;
+    this.taken.push([left, y - 12, left + wide, y - 12 + TALL]);
+    return SVG.text([left, y], words, `font-weight="${font}"`);
+  }
+
+  // A mark around a point, which labels do not cover.
+  circle(view, [x, y], radius, style, title = "") {
+    this.taken.push([x - radius, y - radius, x + radius, y + radius]);
+    return `<circle cx="${x.toFixed(1)}" cy="${y.toFixed(1)}" r="${radius}" fill="none" ${style}>${title}</circle>`;
+  }
+
+  // Words beside points, where they cover no other words; without such a place they are left out.
+  labels({ width, height }) {
+    const isFree = ([left, top, right, bottom]) => left >= 0 && top >= 0 && right <= width && bottom <= height
+      && this.taken.every(([a, b, c, d]) => right < a || c < left || bottom < b || d < top);
+    return this.asked.map(({ at: [x, y], words, colour }) => {
+      const wide = SVG.wide(words);
+      for (const [far, [dx, dy]] of DISTANCES.flatMap(distance => AROUND.map(to => [distance, to]))) {
+        const left = x + far * dx - wide * (1 - dx) / 2, top = y + far * dy - TALL * (1 - dy) / 2;
+        const box = [left - 2, top - 2, left + wide + 2, top + TALL + 2]; // with the halo
+        if (!isFree(box)) continue;
+        this.taken.push(box);
+        const end = [Math.min(Math.max(x, left), left + wide), Math.min(Math.max(y, top), top + TALL)];
+        return (far > FAR ? SVG.line([[x, y], end], `stroke="${colour}" stroke-width="0.7"`) : "")
+          + SVG.text([left, top + 12], words, `fill="${colour}" paint-order="stroke" stroke="#fff" stroke-width="3"`);
+      }
+      return "";
+    }).join("");
   }
 
   node(view, k, factor = view.factor) {
@@ -65,10 +109,9 @@ class Overlay {
 
   supports(view) {
     return this.run.boundaries.map(({ name, colour, nodes }) => {
-      const line = nodes.map(k => this.node(view, k)), [x, y] = line[line.length >> 1];
-      const label = view.names ? SVG.text([x + 5, y - 5], name,
-        `fill="${colour}" paint-order="stroke" stroke="#fff" stroke-width="3"`) : "";
-      return (colour === BLUE ? SVG.line(line, `stroke="${colour}" stroke-width="3"`) : "") + label;
+      const line = nodes.map(k => this.node(view, k)), seen = line.filter(at => view.isSeen(at));
+      if (view.names && seen.length) this.asked.push({ at: seen[seen.length >> 1], words: name, colour });
+      return colour === BLUE ? SVG.line(line, `stroke="${colour}" stroke-width="3"`) : "";
     }).join("");
   }
 
@@ -95,20 +138,25 @@ class Overlay {
   loads(view) {
     const { frames, largestLoad } = this.run;
     if (!view.loads || !largestLoad) return "";
-    return frames[view.frame].loads.map(({ at, moved, force, presses }) => at.map(([x, y], k) => {
-      const [sx, sy] = view.screen([x + view.factor * moved[k][0], y + view.factor * moved[k][1]]);
-      const [dx, dy] = [50 * force[k][0] / largestLoad, -50 * force[k][1] / largestLoad];
-      return presses[k] ? this.arrow([sx - dx, sy - dy], [dx, dy], RED) : this.arrow([sx, sy], [dx, dy], RED);
-    }).join("")).join("");
+    return frames[view.frame].loads.map(({ at, moved, force, presses }) => {
+      let last = [-Infinity, 0];
+      return at.map(([x, y], k) => {
+        const [sx, sy] = view.screen([x + view.factor * moved[k][0], y + view.factor * moved[k][1]]);
+        if (Math.hypot(sx - last[0], sy - last[1]) < CLOSE) return "";
+        last = [sx, sy];
+        const [dx, dy] = [50 * force[k][0] / largestLoad, -50 * force[k][1] / largestLoad];
+        return presses[k] ? this.arrow([sx - dx, sy - dy], [dx, dy], RED) : this.arrow([sx, sy], [dx, dy], RED);
+      }).join("");
+    }).join("");
   }
 
-  // The contact pressure as a curve outside of the body; the top of the scale of all times is 60 pixels away.
+  // The contact pressure as a curve outside of the body; the top of the scale of all times is 60 pixels away, or 40.
   pressure(view) {
     const { curves, frames, topPressure } = this.run;
     if (!view.pressure || !topPressure) return "";
     return curves.map(({ nodes }, c) => {
       const { pressure } = frames[view.frame].contact[c], line = nodes.map(k => this.node(view, k));
-      const off = beside(line, k => 60 * Math.min(pressure[k] / topPressure, 1.2));
+      const off = beside(line, k => (view.isNarrow ? 40 : 60) * Math.min(pressure[k] / topPressure, 1.2));
       const area = [...off, ...line.reverse()].map(p => p.map(x => x.toFixed(1)).join(",")).join(" ");
       return `<polygon points="${area}" fill="${BLUE}" fill-opacity="0.25"/>` + SVG.line(off, `stroke="${BLUE}" stroke-width="1.2"`);
     }).join("");
@@ -129,7 +177,8 @@ class Overlay {
         [[middle + half, angle], [middle - half, angle + Math.PI / 2]].forEach(([stress, turn]) => {
           const size = Math.sqrt(Math.min(Math.abs(stress) / top, 1)) * 0.45 * step;
           if (size < 1) return;
-          const [dx, dy] = [size * Math.cos(turn), -size * Math.sin(turn)], colour = stress > 0 ? RED : BLUE;
+          const [across, up] = [view.stretch[0] * Math.cos(turn), view.stretch[1] * Math.sin(turn)], long = Math.hypot(across, up);
+          const [dx, dy] = [size * across / long, -size * up / long], colour = stress > 0 ? RED : BLUE;
           for (const [stroke, width] of [["#fff", 2.6], [colour, 1.2]]) {
             found.push(SVG.line([[x - dx, y - dy], [x + dx, y + dy]], `stroke="${stroke}" stroke-width="${width}"`));
           }
@@ -142,20 +191,22 @@ class Overlay {
   // The places of the extremes of the shown field, and places where a stress is singular.
   marks(view) {
     if (!view.marks) return "";
-    const { least, largest } = this.run.extremes(view.field, view.frame, view.material);
-    const halo = 'paint-order="stroke" stroke="#fff" stroke-width="3"';
+    const { least, largest } = view.extremes, { factor, isStress } = view.unit;
     // Equal up to rounding: the field has no extremes.
     const isFlat = largest.value - least.value <= 1e-6 * Math.max(Math.abs(least.value), Math.abs(largest.value));
-    const shown = isFlat ? [] : [["min", least], ["max", largest]];
-    const extremes = shown.map(([word, { value, node }]) => {
-      const [x, y] = this.node(view, node);
-      return `<circle cx="${x}" cy="${y}" r="4" fill="none" stroke="${INK}" stroke-width="1.4"/>`
-        + SVG.text([x + 7, y + 4], `${word} ${short(value / view.unit.factor, (view.range.high - view.range.low) / view.unit.factor)}`, halo);
+    const extremes = (isFlat ? [] : [["max", largest], ["min", least]]).map(([word, { value, node }]) => {
+      const at = this.node(view, node);
+      if (!view.isSeen(at)) return "";
+      this.asked.push({ at, words: `${word} ${short(value / factor, (view.range.high - view.range.low) / factor)}`, colour: INK });
+      return this.circle(view, at, 4, `stroke="${INK}" stroke-width="1.4"`);
     });
-    const singular = !view.isLast || !view.unit.isStress ? [] : this.run.singular.map(({ at, reason }) => {
-      const [x, y] = this.node(view, at);
-      return `<circle cx="${x}" cy="${y}" r="8" fill="none" stroke="${RED}" stroke-width="1.6"><title>`
-        + `${SVG.escaped(reason)}</title></circle>` + SVG.text([x + 10, y + 18], "singular", `fill="${RED}" ${halo}`);
+    const named = [];
+    const singular = !view.isLast || !isStress ? [] : this.run.singular.map(({ at: node, reason }) => {
+      const at = this.node(view, node);
+      if (!view.isSeen(at)) return "";
+      // Close ones have one label.
+      if (!named.some(([x, y]) => Math.hypot(x - at[0], y - at[1]) < 40)) named.push(at) && this.asked.push({ at, words: "singular", colour: RED });
+      return this.circle(view, at, 8, `stroke="${RED}" stroke-width="1.6"`, `<title>${SVG.escaped(reason)}</title>`);
     });
     return [...extremes, ...singular].join("");
   }
@@ -175,30 +226,39 @@ class Overlay {
     return view.screen([at(x, u), at(y, v)]);
   }
 
+  // The colour bar on the right, or below in a narrow picture; the texts in the upper corners.
   colourBar(view) {
-    const { range, unit, width, height } = view, [x, top, tall] = [width - 92, 44, Math.max(height - 110, 60)];
+    const { range, unit, width, height, isNarrow } = view, slack = 1e-3 * (range.high - range.low);
+    const [long, thick] = isNarrow ? [width - 56, 12] : [Math.max(height - 110, 60), 16];
     const [low, high] = [range.low / unit.factor, range.high / unit.factor], table = this.run.colours[view.colours];
     const colour = part => `rgb(${table[Math.round(255 * part)].join(",")})`;
-    const bands = view.bands || 64;
-    const boxes = Array.from({ length: bands }, (_, k) => `<rect x="${x}" y="${(top + tall * (1 - (k + 1) / bands)).toFixed(2)}" `
-      + `width="16" height="${(tall / bands + 0.5).toFixed(2)}" fill="${colour((k + 0.5) / bands)}"/>`).join("");
-    const end = (base, tip, part) => `<polygon points="${x},${base} ${x + 16},${base} ${x + 8},${tip}" fill="${colour(part)}"/>`;
-    const labels = ticks(low, high, 6).map(value => {
-      const y = high > low ? top + tall * (1 - (value - low) / (high - low)) : top + tall / 2;
-      return SVG.line([[x + 16, y], [x + 20, y]], `stroke="${INK}"`) + SVG.text([x + 23, y + 4], short(value));
+    // The pixels at a part of the bar's length, so many pixels away from its edge.
+    const at = (part, away) => isNarrow ? [28 + long * part, height - 34 + away] : [width - 92 + away, 44 + long * (1 - part)];
+    const bands = view.bands || 64, whole = isNarrow ? [0, height - 48, width, height] : [width - 98, 30, width, 58 + long];
+    const boxes = Array.from({ length: bands }, (_, k) => [k / bands, (k + 1) / bands + 0.5 / long]).map(([a, b], k) =>
+      SVG.polygon([at(a, 0), at(b, 0), at(b, thick), at(a, thick)], colour((k + 0.5) / bands))).join("");
+    const end = (part, tip) => SVG.polygon([at(part, 0), at(part, thick), at(tip, thick / 2)], colour(part));
+    const labels = ticks(low, high, isNarrow ? Math.max(2, Math.floor(long / 70)) : 6).map(value => {
+      const part = high > low ? (value - low) / (high - low) : 0.5, [x, y] = at(part, thick + 7), words = short(value);
+      return SVG.line([at(part, thick), at(part, thick + 4)], `stroke="${INK}"`)
+        + SVG.text(isNarrow ? [x - SVG.wide(words) / 2, y + 9] : [x, y + 4], words);
     }).join("");
-    const title = `${unit.label}${unit.name ? ` (${unit.name})` : ""}`;
-    return `<rect x="${x - 6}" y="${top - 14}" width="98" height="${tall + 28}" fill="#fff" fill-opacity="0.75"/>` + boxes
-      + (range.largest > range.high * (1 + 1e-6) ? end(top, top - OPEN_END, 1) : "")
-      + (range.least < range.low - 1e-6 * Math.abs(range.low) ? end(top + tall, top + tall + OPEN_END, 0) : "") + labels
-      + SVG.text([width - 8, 18], title, `text-anchor="end" font-weight="600"`) + SVG.text([8, 18], view.moment)
-      + SVG.text([8, 34], view.factor === 1 ? "" : `displacements × ${short(view.factor)}`);
+    const title = `${unit.label}${unit.name ? ` (${unit.name})` : ""}`, [x, y] = view.stretch.map(of => short(Number(of.toPrecision(2))));
+    const stretched = x > 1 ? `x × ${x}` : y > 1 ? `y × ${y}` : "", magnified = view.factor === 1 ? "" : `displacements × ${short(view.factor)}`;
+    const note = [magnified, stretched].filter(Boolean).join(", ");
+    const isCrowded = Math.max(SVG.wide(view.moment), SVG.wide(note)) + SVG.wide(title, "600") > width - 40;
+    this.taken.push(whole);
+    return `<g class="bar"><rect x="${whole[0]}" y="${whole[1]}" width="${whole[2] - whole[0]}" height="${whole[3] - whole[1]}" fill="#fff" `
+      + `fill-opacity="0.75"/>${boxes}` + (range.largest > range.high + slack ? end(1, 1 + OPEN_END / long) : "")
+      + (range.least < range.low - slack ? end(0, -OPEN_END / long) : "") + labels + "</g>"
+      + this.fixed([width - 8, isCrowded ? 50 : 18], title, true, "600") + this.fixed([8, 18], view.moment)
+      + this.fixed([8, view.moment ? 34 : 18], note);
   }
 
   // A length in place of axes.
-  scale({ zoom, height, length }) {
-    const size = ticks(0, 160 / zoom, 3).pop();
-    return SVG.line([[12, height - 18], [12, height - 12], [12 + size * zoom, height - 12], [12 + size * zoom, height - 18]],
-      `stroke="${INK}" stroke-width="1.2"`) + SVG.text([16, height - 18], `${short(size)} ${length}`);
+  scale({ zoom, stretch, height, width, length, isNarrow }) {
+    const pixels = zoom * stretch[0], size = ticks(0, Math.min(160, width / 3) / pixels, 3).pop(), y = isNarrow ? height - 56 : height - 12;
+    return SVG.line([[12, y - 6], [12, y], [12 + size * pixels, y], [12 + size * pixels, y - 6]], `stroke="${INK}" stroke-width="1.2"`)
+      + this.fixed([16, y - 6], `${short(size)} ${length}`);
   }
 }

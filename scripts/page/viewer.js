@@ -1,5 +1,9 @@
 // The state of the page, and what its controls and the pointer do.
 
+const LARGEST_FACTOR = 1e9; // the body is drawn with numbers of four bytes
+const MANY = 60000, REST = 300; // sides of elements; milliseconds
+const SLENDER = [4, 20]; // a body of such proportions can be stretched, and is at first
+
 class View {
   constructor(run, root) {
     Object.assign(this, { run, root, frame: run.frames.length - 1, cut: [], ends: [], length: run.units.length.name });
@@ -8,12 +12,11 @@ class View {
     this.body = new Body(this.canvas, run);
     this.drawing = new Overlay(run);
     this.stressTop = run.stressTop;
-    this.locators = new Map();
+    Object.assign(this, { locators: new Map(), ranges: new Map() });
     this.control = name => root.querySelector(`[name=${name}]`);
     this.fill();
     this.charts();
     this.listen();
-    this.fit();
     this.show(this.frame);
   }
 
@@ -26,7 +29,8 @@ class View {
   }
   get colours() { return this.unit.colours; }
   get material() { return Number(this.control("material").value); }
-  get factor() { return Math.min(Math.max(Number(this.control("factor").value) || 0, 0), 1e9); }
+  get factor() { return Math.min(Math.max(Number(this.control("factor").value) || 0, 0), LARGEST_FACTOR); }
+  get isNarrow() { return this.width < 560; }
   get bands() { return this.control("bands").checked ? 10 : 0; }
 
   fill() {
@@ -39,7 +43,12 @@ class View {
     this.control("frame").max = run.frames.length - 1;
     this.root.querySelector(".time").hidden = run.frames.length < 2;
     this.control("factor").value = run.automatic;
-    for (const name of ["loads", "pressure", "foundation", "mesh", "initial", "names", "marks", "directions"]) {
+    const [low, high] = run.corners(this.frame, 0), [width, height] = high.map((of, axis) => of - low[axis]);
+    const slender = Math.max(width / height, height / width);
+    this.control("stretched").closest("label").hidden = !(slender > SLENDER[0]);
+    this.control("stretched").checked = slender > SLENDER[1];
+    this.control("range").querySelector("[value=frame]").hidden = run.frames.length < 2;
+    for (const name of ["stretched", "loads", "pressure", "foundation", "mesh", "initial", "names", "marks", "directions"]) {
       Object.defineProperty(this, name, { get: () => this.control(name).checked });
     }
     const has = { loads: run.largestLoad, pressure: run.topPressure, foundation: run.curves.length };
@@ -71,8 +80,11 @@ class View {
   listen() {
     const { root, canvas } = this;
     const changed = event => {
-      if (event.target.name === "frame") { this.stop(); return this.show(Number(event.target.value)); }
-      if (["low", "high"].includes(event.target.name)) this.control("range").value = "hand";
+      const { name, value } = event.target, { factor } = this;
+      if (name === "frame") { this.stop(); return this.show(Number(value)); }
+      if (["low", "high"].includes(name)) this.control("range").value = "hand";
+      if (name === "stretched") this.fit();
+      if (name === "factor") this.hint(factor === Number(value) ? "" : `Displacements are multiplied by 0 to ${LARGEST_FACTOR}; shown is ${factor}.`);
       this.show(this.frame);
     };
     for (const kind of ["input", "change"]) root.addEventListener(kind, changed);
@@ -126,22 +138,32 @@ class View {
 
   // Pixels of a place of the picture, and back.
   screen([x, y]) {
-    return [this.width / 2 + this.zoom * (x - this.centre[0]), this.height / 2 - this.zoom * (y - this.centre[1])];
+    const [across, up] = this.stretch;
+    return [this.width / 2 + this.zoom * across * (x - this.centre[0]), this.height / 2 - this.zoom * up * (y - this.centre[1])];
   }
   place([x, y]) {
-    return [this.centre[0] + (x - this.width / 2) / this.zoom, this.centre[1] - (y - this.height / 2) / this.zoom];
+    const [across, up] = this.stretch;
+    return [this.centre[0] + (x - this.width / 2) / this.zoom / across, this.centre[1] - (y - this.height / 2) / this.zoom / up];
   }
 
+  hint(words) { this.root.querySelector("output.hint").value = words; }
+  isSeen([x, y]) { return x >= 0 && y >= 0 && x <= this.width && y <= this.height; }
+
+  // Shows the whole body, between margins for its loads, the labels and the colour bar.
   fit() {
-    const { clientWidth, clientHeight } = this.canvas.parentElement, [[left, bottom], [right, top]] = this.box();
-    Object.assign(this, { width: clientWidth, height: clientHeight, centre: [(left + right) / 2, (bottom + top) / 2] });
-    this.zoom = Math.max(Math.min((clientWidth - 240) / (right - left || 1), (clientHeight - 120) / (top - bottom || 1)), 1e-12);
-    this.centre[0] += 30 / this.zoom;
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement, [[left, bottom], [right, top]] = this.box();
+    Object.assign(this, { width, height });
+    const [before, after, above, below] = this.isNarrow ? [50, 50, 80, 105] : [70, 130, 60, 70];
+    const zooms = [(width - before - after) / (right - left || 1), (height - above - below) / (top - bottom || 1)];
+    this.zoom = Math.max(Math.min(...zooms), 1e-12);
+    this.stretch = zooms.map(of => this.stretched ? Math.max(of / this.zoom, 1) : 1);
+    this.centre = [(left + right + (after - before) / this.zoom / this.stretch[0]) / 2,
+      (bottom + top + (above - below) / this.zoom / this.stretch[1]) / 2];
   }
 
   // Corners around the body as it is shown, and around those of `run`, which contain the foundation, for a usual factor.
   box() {
-    const { low, high } = this.locator(), [[left, bottom], [right, top]] = this.run.box;
+    const [low, high] = this.run.corners(this.frame, this.factor), [[left, bottom], [right, top]] = this.run.box;
     if (this.factor > this.run.automatic) return [low, high];
     return [[Math.min(left, low[0]), Math.min(bottom, low[1])], [Math.max(right, high[0]), Math.max(top, high[1])]];
   }
@@ -155,12 +177,13 @@ class View {
   }
 
   moveBy([dx, dy]) {
-    this.centre = [this.centre[0] - dx / this.zoom, this.centre[1] + dy / this.zoom];
+    this.centre = [this.centre[0] - dx / this.zoom / this.stretch[0], this.centre[1] + dy / this.zoom / this.stretch[1]];
     this.draw();
   }
 
   // Shows a frame with the chosen field.
   show(frame) {
+    if (!this.run.frames[frame].columns) return;
     this.frame = frame;
     this.control("frame").value = frame;
     this.root.querySelector("output.moment").value = this.moment;
@@ -168,6 +191,8 @@ class View {
     this.body.move(frame);
     this.body.colour(this.shown);
     this.range = this.chosenRange();
+    this.extremes = this.run.extremes(this.field, frame, this.material);
+    if (!this.width) this.fit();
     this.contact.forEach((chart, part) => chart.show(contactData(this.run, frame, part)));
     this.titles.forEach((title, part) => { title.textContent = this.titleOf(part); });
     this.showLine();
@@ -177,9 +202,8 @@ class View {
 
   chosenRange() {
     const kind = this.control("range").value, { factor } = this.unit, { run, field, material, frame } = this;
-    const all = [...run.frames.keys()], key = `${field} ${material}`;
+    const all = [...run.frames.keys()].filter(k => run.frames[k].columns), key = `${field} ${material}`;
     if (kind === "frame") return this.written(run.range(field, [frame], material));
-    this.ranges ??= new Map();
     if (!this.ranges.has(key)) this.ranges.set(key, run.range(field, all, material));
     const found = { ...this.ranges.get(key) };
     if (kind !== "hand") return this.written(found);
@@ -193,17 +217,14 @@ class View {
     return range;
   }
 
+  // Draws before the next repaint, and the mesh of many elements when the picture rests.
   draw() {
     cancelAnimationFrame(this.asked);
-    this.asked = requestAnimationFrame(() => {
-      this.body.draw({ ...this.settings(), mesh: this.mesh });
-      this.overlay.innerHTML = this.drawing.draw(this);
-    });
-  }
-
-  settings() {
-    const { centre, zoom, width, height, factor, material, colours, bands, range } = this;
-    return { centre, zoom, width, height, factor, material, colours, bands, range };
+    clearTimeout(this.rest);
+    const paint = mesh => { this.body.draw(this, mesh); this.overlay.innerHTML = this.drawing.draw(this); };
+    const isLater = this.mesh && this.run.order * this.run.size > MANY;
+    this.asked = requestAnimationFrame(() => paint(this.mesh && !isLater));
+    if (isLater) this.rest = setTimeout(paint, REST, true);
   }
 
   // The locator of the shown state, or of the undeformed body.
@@ -211,7 +232,7 @@ class View {
     const key = factor ? `${this.frame} ${factor}` : "undeformed", { locators } = this;
     if (!locators.has(key)) {
       for (const old of locators.keys()) if (old !== "undeformed") locators.delete(old);
-      locators.set(key, new Locator(this.run, factor ? this.run.places(this.frame, factor) : this.run.nodes));
+      locators.set(key, new Locator(this.run, this.frame, factor));
     }
     return locators.get(key);
   }
@@ -250,7 +271,7 @@ class View {
     this.ends = [];
     this.cut = [];
     this.isAsking = true;
-    this.root.querySelector("output.hint").value = "Click on the body where the line begins, and where it ends.";
+    this.hint("Click on the body where the line begins, and where it ends.");
   }
 
   click(pixel) {
@@ -260,7 +281,7 @@ class View {
     this.ends.push([this.run.x, this.run.y].map(of => this.run.interpolate(of, spot)));
     if (this.ends.length < 2) return;
     this.isAsking = false;
-    this.root.querySelector("output.hint").value = "";
+    this.hint("");
     this.cut = cutBetween(this.run, this.locator(0), ...this.ends);
     this.showLine();
     this.draw();
@@ -281,7 +302,7 @@ class View {
       this.lineLabel = label;
     }
     const [from, to] = this.ends.map(end => `(${end.map((x, axis) => short(x + this.run.origin[axis])).join(", ")})`);
-    this.along.querySelector("p").textContent = `${this.unit.label} from ${from} to ${to}, ${this.moment}`;
+    this.along.querySelector("p").textContent = [`${this.unit.label} from ${from} to ${to}`, this.moment].filter(Boolean).join(", ");
     this.line.show(this.lineData());
   }
 
@@ -295,7 +316,7 @@ class View {
 
   // The picture as text: the coloured body as an image, the rest as vectors.
   picture() {
-    this.body.draw({ ...this.settings(), mesh: this.mesh });
+    this.body.draw(this, this.mesh);
     const { width, height } = this;
     return `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" font-family="sans-serif" font-size="12">`
       + `<image href="${this.canvas.toDataURL()}" width="${width}" height="${height}"/>${this.drawing.draw(this)}</svg>`;
@@ -332,6 +353,14 @@ class View {
 }
 
 const root = document.getElementById("viewer");
-Run.read().then(run => { root.view = new View(run, root); }).catch(error => {
+Run.read().then(async run => {
+  const view = new View(run, root), last = run.frames.length - 1;
+  // The last state is seen while the others are read.
+  await new Promise(done => requestAnimationFrame(() => setTimeout(done)));
+  for (let k = 0; k < last; k++) await run.readFrame(k);
+  view.ranges.clear();
+  view.show(view.frame);
+  root.view = view;
+}).catch(error => {
   root.querySelector("output.hint").value = `This browser cannot show the fields: ${error.message}.`;
 });

@@ -1,5 +1,6 @@
-"""Compares every number of the tables of report.html with history.csv and summary.json; prints those that contradict,
-and the number of those compared. It shares no code with the scripts."""
+"""Compares every number of the tables of report.html with history.csv and summary.json, and the curves in time that the page
+draws with history.csv; prints those that contradict, and the number of those compared. It shares no code with the scripts,
+which draw the curves."""
 
 import csv
 import html
@@ -7,6 +8,11 @@ import json
 import re
 import sys
 from pathlib import Path
+
+import numpy as np
+from drawing import plt
+from histories import draw_damage_history, draw_histories
+from reading import read_results
 
 NUMBER = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
 # A number with a bar and a power of ten, or a plain one, with or without a bar.
@@ -45,7 +51,28 @@ def extreme(name, column):
     return min(numbers) if least else max(numbers) if name.endswith("_max") else max(numbers, key=abs)
 
 
-count = 0
+def curves(folder, history, labels):
+    """Compares the curves in time, each with its column, which the title of its panel or the legend names; returns the number of
+    points."""
+    results = read_results(folder)
+    drawn = [(axes.get_title(loc="left"), line) for axes in getattr(draw_histories(results), "axes", []) for line in axes.lines]
+    drawn += [(f"{line.get_label()} {axes.get_ylabel()}", line) for axes in getattr(draw_damage_history(results), "axes", [])
+              for line in axes.lines if len(line.get_xdata()) > 2]
+    for title, line in drawn:
+        power = re.search(r"10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", title)
+        scale = 10.0 ** int(power[1].translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")) if power else 0)
+        is_damage = "damage 1 − ζ" in title
+        name = {"mean": "zeta_mean", "largest": "zeta_min"}[title.split()[0]] if is_damage else labels[title.partition(" (")[0]]
+        column = np.array([float(row[name] or "nan") for row in history])
+        exact = np.transpose([[float(row["time"]) for row in history], 1.0 - column if is_damage else column])
+        points = np.transpose([line.get_xdata(), np.multiply(line.get_ydata(), scale)])
+        if points.shape != exact.shape or not np.allclose(points, exact, rtol=1e-12, atol=0.0, equal_nan=True):
+            print(f"{folder}: the curve of {title} is not {name} of history.csv")
+    plt.close("all")
+    return sum(len(line.get_xdata()) for _, line in drawn)
+
+
+count = points = 0
 for folder in map(Path, sys.argv[1:]):
     summary = json.loads((folder / "summary.json").read_text())
     with open(folder / "history.csv", newline="") as file:
@@ -61,6 +88,7 @@ for folder in map(Path, sys.argv[1:]):
                for row in re.findall(r"<tr>(.*?)</tr>", table)] for table in re.findall(r"<table>(.*?)</table>", page)]
     # A stress away from singular points names the distance; a surface may be the rest of the body.
     labels = {of["label"].replace(" away from singular points", ", away"): name for name, of in figures.items() if "." not in name}
+    points += curves(folder, history, {of["label"]: name for name, of in figures.items() if "." not in name})
     for head, *rows in tables:
         name = ""
         for label, *cells in rows:
@@ -83,4 +111,4 @@ for folder in map(Path, sys.argv[1:]):
     if summary["stopped_by"]:
         count += compared(f"{folder}, the end", re.search(r"at t = (.*?) s", re.search(
             r'class="ending">(.*?)</p>', page)[1])[1], [summary["stopped_at"]])
-print(count, "numbers")
+print(count, "numbers", points, "points")

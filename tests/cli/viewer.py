@@ -1,9 +1,10 @@
 """Looks at report.html in Chromium, and prints what is wrong with it; then the number of values that were compared. It
-shares no code with the scripts: it reads the VTU by meshio.
+shares no code with the scripts: it reads the VTU by meshio. With --labels it looks at the places of labels only.
 
-    viewer.py FOLDER
+    viewer.py FOLDER [--labels]
 """
 
+import csv
 import sys
 import time
 import xml.etree.ElementTree as ElementTree
@@ -36,6 +37,25 @@ FIELDS = {
     "stress_yy": ("stress", 1, None), "stress_xy": ("stress", 2, None), "stress_zz": ("stress", 3, None),
     "u_x": ("displacement", 0, None), "u_y": ("displacement", 1, None),
 }
+
+
+# Figures of history.csv that are extremes of a field over the nodes.
+EXTREMES = {
+    "zeta_min": ("zeta", "least"), "displacement_max": ("displacement", "largest"), "von_mises_max": ("von_mises", "largest"),
+    "principal_max": ("stress_1", "largest"), "principal_min": ("stress_2", "least"),
+}
+# The boxes of the texts of the picture, the colour bar and the picture, pixels; texts of the bar come last.
+BOXES = """
+const box = of => { const {left, top, right, bottom} = of.getBoundingClientRect(); return [left, top, right, bottom]; };
+const all = [...document.querySelectorAll("#viewer .picture text")], isOfBar = of => Boolean(of.closest(".bar"));
+return {names: all.map(of => of.textContent), texts: all.map(box), ofBar: all.map(isOfBar),
+        bar: box(document.querySelector("#viewer .bar")), picture: box(document.querySelector("#viewer .picture"))}"""
+
+# After a change the picture is drawn before the next repaint.
+DRAWN = """
+let left = 4;
+const again = () => { left--; left ? requestAnimationFrame(again) : arguments[0](); };
+again()"""
 
 
 def browser():
@@ -97,7 +117,67 @@ def curve(page, view, mesh, random):
     return 3
 
 
-def main(folder):
+def labels(page, folder):
+    """No text of the picture lies over another one, the colour bar or the edge; returns the number of texts."""
+    count = 0
+    page.execute_script("document.querySelectorAll('#viewer [type=checkbox]').forEach(of => { of.checked = true; })")
+    fields = page.execute_script("return Object.keys(document.getElementById('viewer').view.run.fields)")
+    for width, height in ((360, 640), (800, 600), (1400, 1000)):
+        # Windows have a least width.
+        page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                             {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
+        for field in fields:
+            for factor in ("1", "2000"):
+                page.execute_script(SET, "factor", factor)
+                page.execute_script(SET, "field", field)
+                page.execute_async_script(DRAWN)
+                found = page.execute_script(BOXES)
+                names, texts, (left, top, right, bottom) = found["names"], found["texts"], found["picture"]
+                count += sum(map(bool, names))
+                here = f"{folder.name}, {field} × {factor}, {width} pixels"
+                for k, (name, box) in enumerate(zip(names, texts)):
+                    if name and not (left <= box[0] and top <= box[1] and box[2] <= right and box[3] <= bottom):
+                        print(f"{here}: {name} is cut off")
+                    others = list(zip(names, texts))[k + 1:] + [("the colour bar", found["bar"])] * (not found["ofBar"][k])
+                    for other, of in others:
+                        # Boxes of the browser have rounded edges.
+                        if name and other and min(box[2], of[2]) - max(box[0], of[0]) > 0.5 and min(
+                                box[3], of[3]) - max(box[1], of[1]) > 0.5:
+                            print(f"{here}: {name} lies over {other}")
+                if factor == "1" and not any(of.startswith(("min", "max")) for of in names):
+                    print(f"{here}: no extreme has a label")
+    return count
+
+
+def with_history(page, folder, frame, moment):
+    """The extremes of the fields of a frame are those of history.csv, and the curves of Γ_C those of contact.csv; returns the
+    number of compared values."""
+    with open(folder / "history.csv", newline="") as file:
+        row = next(of for of in csv.DictReader(file) if abs(float(of["time"]) - moment) <= 1e-9)
+    found = page.execute_script("""
+        const {run} = document.getElementById("viewer").view, found = {};
+        for (const [name, [field, end]] of Object.entries(arguments[0])) {
+          found[name] = run.fields[field] ? run.extremes(field, arguments[1], -1)[end].value : null;
+        }
+        const pressures = run.frames[arguments[1]].contact.flatMap(of => [...of.pressure]);
+        return {...found, pressure_max: Math.max(...pressures)}""", EXTREMES, frame)
+    for name, value in found.items():
+        exact, size = float(row[name]), max(abs(float(row[other])) for other in (name, "von_mises_max" if "principal" in name else name))
+        if value is not None and abs(value - exact) > 2e-5 * size + 1e-12:
+            print(f"{name} in frame {frame}: {value}, but {exact} in history.csv")
+    factor, drawn = page.execute_script("""
+        const {view} = document.getElementById("viewer");
+        return [view.run.units.stress.factor, view.contact.map(of => of.plot.data.map(column => [...column]))]""")
+    with open(folder / "contact.csv", newline="") as file:
+        rows = [of for of in csv.DictReader(file) if abs(float(of["time"]) - moment) <= 1e-9]
+    exact = np.array([[float(of[name]) for name in ("arc_length", "pressure", "gap")] for of in rows])
+    curves = np.hstack([np.array(of) for of in drawn]).T * (1.0, factor, 1.0)
+    if curves.shape != exact.shape or np.any(np.abs(curves - exact) > 2e-5 * np.abs(exact).max(axis=0) + 1e-12):
+        print(f"the curves along the foundation in frame {frame} are not those of contact.csv")
+    return len(found) + exact.size
+
+
+def main(folder, only_labels):
     page, compared = browser(), 0
     frames = [(float(of.get("timestep")), folder / of.get("file"))
               for of in ElementTree.parse(folder / "fields.pvd").iter("DataSet")]
@@ -108,6 +188,9 @@ def main(folder):
             if time.monotonic() > deadline:
                 sys.exit("no picture: " + page.execute_script("return document.querySelector('.hint').value"))
             time.sleep(0.05)
+        if only_labels:
+            print(labels(page, folder))
+            return
         view = page.execute_script("const {run} = document.getElementById('viewer').view;"
                                    "return {origin: run.origin, fields: Object.keys(run.fields), factor: run.units.stress.factor}")
         if page.execute_script("return document.querySelector('#viewer [name=frame]').max") != str(len(frames) - 1):
@@ -119,6 +202,7 @@ def main(folder):
             moment = page.execute_script("return document.querySelector('#viewer .moment').value")
             if f"{frames[frame][0]:g}" not in moment:
                 print(f"frame {frame} at {frames[frame][0]} is called {moment!r}")
+            compared += with_history(page, folder, frame, frames[frame][0])
             for field in view["fields"]:
                 if field not in FIELDS:
                     continue
@@ -154,6 +238,11 @@ def main(folder):
         page.execute_script(SET, "frame", "0")
         if page.execute_script(shown) != [1, 3]:
             print(f"the range by hand is {page.execute_script(shown)}")
+        # A factor that is not used is said to be none.
+        for factor, said in (("1e12", True), ("-1", True), ("3", False)):
+            page.execute_script(SET, "factor", factor)
+            if ("multiplied by" in page.execute_script("return document.querySelector('.hint').value")) != said:
+                print(f"the factor {factor} is {'not ' * said}said to be left out")
         compared += curve(page, view, meshio.read(frames[0][1]), random)
         # With everything on, the picture is valid SVG.
         page.execute_script("document.querySelectorAll('#viewer [type=checkbox]').forEach(of => { of.checked = true; })")
@@ -175,4 +264,4 @@ def main(folder):
         page.quit()
 
 
-main(Path(sys.argv[1]))
+main(Path(sys.argv[1]), "--labels" in sys.argv)
