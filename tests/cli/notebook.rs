@@ -44,7 +44,7 @@ text = repr(path)
 assert 'finished at t = 1 s after 10 steps' in text and 'work of the loads' in text and '±' not in text
 assert '<img src=\"data:image/png;base64,' in path._repr_html_()
 axes = path.plot('damage', time=0.5, factor=2)
-assert axes.get_title() == 't = 0.5 s' and path.plot('stress_yy', axes=axes) is axes
+assert axes.get_title() == 't = 0.5 s, displacements × 2' and path.plot('stress_yy', axes=axes) is axes
 x, y = path.plot.pressure().lines[0].get_data()
 assert np.ptp(x) == 1 and y.max() == path.frame().along('bottom', 'normal_pressure')[1].max() > 0
 found, frame = path.matrices(0.5), path.frame(0.5)
