@@ -42,8 +42,15 @@ enum Command {
     Run(command::RunArguments),
     /// Write NAME.geo and NAME.toml: a small geometry and scene, which run as they are, as a start.
     New {
-        /// The name; it may contain a folder.
-        name: PathBuf,
+        /// The name; it may contain a folder. [default: that of the scene of the gallery]
+        #[arg(required_unless_present_any = ["from", "list"])]
+        name: Option<PathBuf>,
+        /// Start from a scene of the gallery.
+        #[arg(long, value_name = "SCENE")]
+        from: Option<String>,
+        /// List the scenes of the gallery: bodies with published or closed answers.
+        #[arg(long, conflicts_with_all = ["name", "from"])]
+        list: bool,
     },
     /// Describe a scene without solving it: mesh, boundaries, loads, support, unknowns, cost. Like
     /// `mesh`, it meshes a .geo unless this was done before.
@@ -148,7 +155,8 @@ fn execute() -> u8 {
     }
     let result = match command {
         Command::Run(arguments) => command::run(&arguments),
-        Command::New { name } => command::new(&name),
+        Command::New { list: true, .. } => command::list_gallery(),
+        Command::New { name, from, .. } => command::new(name.as_deref(), from.as_deref()),
         Command::Check(arguments) => command::check(&arguments),
         Command::Export(arguments) => command::export(&arguments),
         Command::Info(arguments) => command::script("info", &arguments),

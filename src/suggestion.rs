@@ -16,7 +16,7 @@ pub fn most_similar<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Opt
 
 /// The end of a message about an unknown `name`: the most similar `known` name, and the list of all, or of the nearest three
 /// of many.
-pub(crate) fn suggestion(name: &str, known: &[impl AsRef<str>]) -> String {
+pub fn suggestion(name: &str, known: &[impl AsRef<str>]) -> String {
     let known = Vec::from_iter(known.iter().map(AsRef::as_ref));
     let list = match known.len() {
         0 => return " (there are none)".to_owned(),

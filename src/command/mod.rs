@@ -25,7 +25,7 @@ mod task;
 pub use check::check;
 pub use ending::{install, out_of_memory, watch};
 pub use export::{ExportArguments, export};
-pub use new::new;
+pub use new::{list_gallery, new};
 pub use provenance::version;
 pub use run::{RunArguments, run};
 pub use script::{ScriptArguments, script};

@@ -1,7 +1,7 @@
 //! `signorini new`, and the tutorial and the README as they are typed.
 
 use crate::test_directory::{ProgramOutput, TestDirectory};
-use std::{fs, path::Path};
+use std::{env, fs, path::Path, process::Command};
 
 /// Blocks of the tutorial between fences: the text before it, what stands behind the opening fence, and the content.
 fn blocks<'a>(page: &'a str) -> Vec<(&'a str, &'a str, &'a str)> {
@@ -93,4 +93,52 @@ fn a_new_scene_overwrites_nothing() {
     assert_eq!((checked.code, checked.err.as_str()), (Some(0), ""), "{checked:?}");
     let unwritable = ProgramOutput::of(&mut test_directory.command(&["new", "nowhere/wall"]));
     unwritable.fails(2, &["cannot write nowhere/", "No such file"]);
+}
+
+#[test]
+fn every_scene_of_the_gallery_is_a_start_that_passes_check() {
+    let test_directory = TestDirectory::new();
+    let listed = test_directory.say(&["new", "--list"]);
+    let names = listed.out.lines().map(|line| line.split_once(' ').expect("a name and a title"));
+    let names = Vec::from_iter(names);
+    assert!((12..=16).contains(&names.len()), "{listed:?}");
+    for (name, title) in names {
+        let [scene, geometry] = ["toml", "geo"].map(|ending| format!("{name}.{ending}"));
+        let written = test_directory.say(&["new", "--from", name]);
+        assert_eq!((written.code, written.err.as_str()), (Some(0), ""), "{written:?}");
+        assert!(test_directory.read(&scene).contains(&format!("\"{geometry}\"")), "{scene}");
+        let checked = test_directory.say(&["check", &scene]);
+        assert_eq!(checked.code, Some(0), "{checked:?}");
+        assert!(checked.out.starts_with(title.trim()) && !title.trim().is_empty(), "{checked:?}");
+        test_directory.say(&["new", "--from", name]).fails(2, &["is there already"]);
+    }
+    // Under a name of the user's own, and an unknown start.
+    assert_eq!(test_directory.say(&["new", "my/cook", "--from", "cook"]).code, Some(2));
+    assert_eq!(test_directory.say(&["new", "mine", "--from", "cook"]).code, Some(0));
+    assert!(test_directory.read("mine.toml").contains("\"mine.geo\""));
+    test_directory.say(&["new", "--from", "cok"]).fails(2, &["did you mean `cook`?", "nafems_le1"]);
+    test_directory.say(&["new"]).fails(2, &["NAME"]);
+}
+
+/// Cheap scenes of the gallery have their published or closed answers within their bars; `make docs` runs all of them.
+#[test]
+fn answers_of_the_gallery_are_within_their_bars() {
+    let test_directory = TestDirectory::new();
+    let made = Command::new(env::var("PYTHON").unwrap_or("/usr/bin/python3".to_owned()))
+        .args(["scripts/site/gallery.py", "--binary", env!("CARGO_BIN_EXE_signorini"), "--out"])
+        .arg(test_directory.path("site"))
+        .args(["levy_dam", "damage_stop", "overturn"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("Python");
+    let said = String::from_utf8_lossy(&made.stdout);
+    assert!(made.status.success(), "{said}{}", String::from_utf8_lossy(&made.stderr));
+    for agrees in ["levy_dam", "5 of 5 agree", "damage_stop", "1 of 1 agree", "overturn"] {
+        assert!(said.contains(agrees), "{agrees}: {said}");
+    }
+    let page = test_directory.read("site/gallery/levy_dam.md");
+    assert!(
+        page.contains("| agrees |") && page.contains("signorini new --from levy_dam"),
+        "{page}"
+    );
 }
