@@ -46,7 +46,7 @@ export SIGNORINI_COMMIT := $(shell git describe --always --dirty 2>/dev/null)
 # rustup puts cargo where a shell opened before does not look.
 export PATH := $(PATH):$(HOME)/.cargo/bin:$(if $(CARGO_TARGET_DIR),,$(CURDIR)/)$(TARGET)/tools/bin
 
-.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb wheel licences mesh run plot keys viewer test nastran validate random compare \
+.PHONY: help deps deps-test deps-validate deps-random deps-peers build deb wheel licences mesh run plot keys docs viewer test nastran validate random compare \
     bench stability reference converge paper chart accuracy promises handbook bounds \
     constants architecture fuzz systems clean
 
@@ -62,6 +62,7 @@ help:
 	@echo 'make run        every scene; or SCENE="geo/a.toml …" SOLVER=name ARGS="--set time.step=0.005"'
 	@echo 'make plot       the pictures of every run in out/, again; or ARGS="--animate --format svg"'
 	@echo 'make keys       geo/KEYS.md from the schema of scenes and the figures of the program'
+	@echo 'make docs       the site of the pages, with the gallery, in target/site/book (minutes; needs mdBook: cargo installs it)'
 	@echo 'make test       format, lints, documentation, tests (4 minutes)'
 	@echo 'make nastran    the test of Nastran, with pyNastran in .venv-nastran'
 	@echo 'make validate   the comparison with FEniCSx (installs it: make deps-validate)'
@@ -168,6 +169,11 @@ viewer:
 keys: build
 	@$(PYTHON) scripts/keys.py geo/scene.schema.json $(BINARY) >geo/KEYS.md.new
 	@chmod --reference=geo/KEYS.md geo/KEYS.md.new && mv geo/KEYS.md.new geo/KEYS.md
+
+# The site works without network. It fails if a link leads nowhere, or if an answer of the gallery misses the published one.
+docs: build
+	@command -v mdbook >/dev/null || cargo install --locked mdbook --version '^0.5' --no-default-features --features search
+	$(PYTHON) scripts/site/book.py --binary $(BINARY) $(ARGS)
 
 # `tee` shows the output; the exit code is that of the tests.
 test: deps-test
