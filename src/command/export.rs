@@ -34,24 +34,8 @@ pub struct ExportArguments {
 }
 
 /// All files that an export may have.
-const EXPORTED: [&str; 16] = [
-    "K.mtx",
-    "A.mtx",
-    "B.mtx",
-    "u_D.mtx",
-    "g.mtx",
-    "f.mtx",
-    "u.mtx",
-    "zeta.mtx",
-    "nodes.csv",
-    "triangles.csv",
-    "M.mtx",
-    "L.mtx",
-    "source.mtx",
-    "zeta_before.mtx",
-    "export.json",
-    "README.md",
-];
+const EXPORTED: &str = "K.mtx A.mtx B.mtx u_D.mtx g.mtx f.mtx u.mtx zeta.mtx \
+                        nodes.csv triangles.csv M.mtx L.mtx source.mtx zeta_before.mtx export.json README.md";
 
 /// The names of the files that an earlier export has left in a folder.
 fn earlier(out: &Path) -> Vec<String> {
@@ -85,7 +69,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     let earlier = earlier(out);
     let is_own = |name: &str| earlier.iter().any(|known| known == name);
     EXPORTED
-        .iter()
+        .split(' ')
         .try_for_each(|name| check_is_own(&out.join(name), || is_own(name)))
         .map_err(Failure::input)?;
     let (mut scene, _) = scene.read(&[])?;
@@ -120,7 +104,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     create(out).map_err(Failure::input)?;
     // An earlier export may have files that this one has not.
     let is_new = |name: &str| files.iter().any(|(new, _)| *new == name);
-    let stale = EXPORTED.iter().filter(|name| is_own(name) && !is_new(name));
+    let stale = EXPORTED.split(' ').filter(|name| is_own(name) && !is_new(name));
     stale.for_each(|name| drop(fs::remove_file(out.join(name))));
     files.iter().try_for_each(|(name, text)| write_whole(&out.join(name), text.as_bytes()))?;
     let end = rounded(states[0].time);
