@@ -77,7 +77,7 @@ help:
 	@echo 'make accuracy   true errors over the accuracy asked for (minutes); or ACCURACY="geo/a.toml …"'
 	@echo 'make promises   bars and "reached" of --accuracy on bodies that are not shipped (half an hour, once)'
 	@echo 'make handbook   published and closed answers, with bars and with --accuracy (minutes); or ARGS="hertz_plane"'
-	@echo 'make bounds     the proved bound on the error of u against true errors on 470 bodies (ten minutes)'
+	@echo 'make bounds     the proved bound on the error of u against true errors on 670 random scenes (ten minutes)'
 	@echo 'make constants  the register of tuned constants, validation/CONSTANTS.md, from their comments'
 	@echo 'make architecture  the picture of the rooms of src, geo/rooms.svg, from their use lines'
 	@echo 'make viewer     the libraries of the page of a report, bundled anew (npm)'

@@ -36,10 +36,6 @@ pub struct Extreme {
 }
 
 impl Extreme {
-    fn distance(&self, [x, y]: [f64; 2]) -> f64 {
-        (x - self.at[0]).hypot(y - self.at[1])
-    }
-
     /// Does the mesh determine its value?
     pub fn is_known(&self) -> bool {
         self.singular.is_none() && self.unresolved.is_none()
@@ -298,11 +294,10 @@ impl<'a> Extremes<'a> {
     fn near(&self, points: &[Singular]) -> Vec<Option<String>> {
         let named = |extreme: &Extreme| {
             let of_fits = !self.problem.figures[extreme.number].is_pressure();
+            let from = |at: [f64; 2]| distance(extreme.at, at);
             let reach = if of_fits { 2.0 / TIES } else { 1.0 / TIES };
-            let near =
-                points.iter().filter(|point| extreme.distance(point.at) <= reach * point.radius);
-            let nearest =
-                near.min_by(|a, b| extreme.distance(a.at).total_cmp(&extreme.distance(b.at)));
+            let near = points.iter().filter(|point| from(point.at) <= reach * point.radius);
+            let nearest = near.min_by(|a, b| from(a.at).total_cmp(&from(b.at)));
             let value = |at: [f64; 2]| self.value(extreme, at);
             let is_large = |point: &&Singular| value(point.at) >= 0.5 * value(extreme.at);
             nearest.filter(is_large).map(|point| point.name.clone())

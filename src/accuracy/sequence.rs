@@ -85,11 +85,7 @@ impl<'a> Sequence<'a> {
         let [coarser @ .., finest] = &self.answers[..] else { return 0.0 };
         let (before, from_answer) = coarser.split_at(self.answer);
         let weighted = before.iter().map(|answer| {
-            let ratio = if answer.error > from_answer[0].error {
-                from_answer[0].error / answer.error
-            } else {
-                1.0
-            };
+            let ratio = (from_answer[0].error / answer.error).min(1.0);
             ratio * ratio * difference(answer, finest)
         });
         let changes = from_answer.iter().map(|answer| difference(answer, finest));

@@ -166,10 +166,8 @@ fn loads(problem: &ObservedProblem) -> Vec<String> {
 fn support(problem: &ObservedProblem) -> Vec<String> {
     let motions = &problem.motions;
     if motions.all_prevented() {
-        return vec![row(
-            "support",
-            "the boundary conditions prevent all rigid motions".to_owned(),
-        )];
+        let words = "the boundary conditions prevent all rigid motions";
+        return vec![row("support", words.to_owned())];
     }
     let by_contact = |motion| format!("only contact supports the body against {motion}, one way");
     let stands = problem.collapse.map(|Collapse { time, motion }| {

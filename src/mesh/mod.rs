@@ -196,11 +196,8 @@ impl Side {
 fn sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let of_triangle = |(triangle, &[a, b, c]): (usize, &[usize; 3])| {
         [[a, b], [b, c], [c, a]].map(|[p, q]| {
-            let ends = sorted([p, q]);
-            (
-                ends[0],
-                Side { ends: ends.map(|n| n as u32), on_left: p < q, number: triangle as u32 },
-            )
+            let ends = sorted([p, q]).map(|n| n as u32);
+            (p.min(q), Side { ends, on_left: p < q, number: triangle as u32 })
         })
     };
     let nodes = triangles.as_flattened().iter().max().map_or(0, |last| last + 1);

@@ -47,13 +47,8 @@ impl FirstContact {
                 let time = time.clamp(start, end);
                 let [at, earlier, later] = [time, start, end].map(load);
                 let of_load = |k: usize| {
-                    [
-                        at[k],
-                        [earlier, later]
-                            .map(|of| (of[k] - at[k]).abs())
-                            .into_iter()
-                            .fold(0.0, f64::max),
-                    ]
+                    let change = |of: [f64; 2]| (of[k] - at[k]).abs();
+                    [at[k], change(earlier).max(change(later))]
                 };
                 let error = (time - start).max(end - time);
                 self.found = Some([[time, error], of_load(0), of_load(1)]);

@@ -51,9 +51,6 @@ impl BoundedQuadratic {
         // All systems have the full size, whatever the active set, so that a factor can be used again.
         set_default_option("-tao_subset_type", "mask")?;
         let c_method = c_string(method)?;
-        // The Hessian of the quasi-Newton Krylov methods is an operator without entries, which cannot be
-        // factorised. They bring their own preconditioner.
-        let quasi_newton = method.starts_with("bqnk");
         let (mut ksp, mut pc) = (ptr::null_mut(), ptr::null_mut());
         // SAFETY: a fresh handle, then live ones; the string lives during the calls.
         unsafe {
@@ -63,7 +60,7 @@ impl BoundedQuadratic {
             let tao = this.tao.raw();
             check(raw::TaoSetType(tao, c_method.as_ptr()))?;
             check(raw::TaoGetKSP(tao, &mut ksp))?;
-            if !quasi_newton && !ksp.is_null() {
+            if !ksp.is_null() {
                 check(raw::KSPGetPC(ksp, &mut pc))?;
                 check(raw::PCSetType(pc, shell_preconditioner::NAME.as_ptr()))?;
             }

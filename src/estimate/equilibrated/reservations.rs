@@ -1,7 +1,7 @@
 //! The data of a scene that a proof leaves out.
 
 use super::pressure::ContactEdge;
-use crate::{problem::DiscreteProblem, scene::Expression};
+use crate::{mesh::bounds, problem::DiscreteProblem, scene::Expression};
 
 /// Functions may jump at vertices, so this part of a triangle or of a side at its ends does not count.
 const AT_JUMP: f64 = 1e-9;
@@ -13,16 +13,12 @@ pub(super) fn of(problem: &DiscreteProblem, edges: &[ContactEdge], time: f64) ->
     let degree = body.order() as u32 + 1;
     // Is f a polynomial of at most the `degree` between these vertices? It may have jumps at them.
     let varies = |f: &Expression, vertices: &[usize], degree: u32| {
-        let range = |k: usize| {
-            let values = vertices.iter().map(|vertex| body.mesh.nodes[*vertex][k]);
-            let [low, high] = values
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                    [low.min(value), high.max(value)]
-                });
+        let [x, y] = bounds(vertices.iter().map(|vertex| &body.mesh.nodes[*vertex]));
+        let [x, y] = [x, y].map(|[low, high]| {
             let within = AT_JUMP * (high - low);
             [low + within, high - within]
-        };
-        f.degree([range(0), range(1), [time; 2]]).is_none_or(|of| of > degree)
+        });
+        f.degree([x, y, [time; 2]]).is_none_or(|of| of > degree)
     };
     let (mut loads, mut values) = (false, false);
     for force in &scene.body_force {
