@@ -185,7 +185,7 @@ test: deps-test
 	$(PYTHON) validation/words.py
 	@if command -v cargo-deny >/dev/null; \
 	    then cargo deny --offline --locked --workspace check licenses bans sources \
-	        $(if $(wildcard $(or $(CARGO_HOME),$(HOME)/.cargo)/advisory-dbs/*),advisories); \
+	        $(if $(wildcard $(or $(CARGO_HOME),$(HOME)/.cargo)/advisory-dbs/*/.git),advisories); \
 	    else echo 'note: cargo-deny is missing: the licences of the crates are not checked'; fi
 	@{ cargo test --locked --workspace --no-fail-fast \
 	    --config "target.'cfg(unix)'.runner = ['$(CURDIR)/scripts/run_tests.sh']" 2>&1; \
