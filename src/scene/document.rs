@@ -113,31 +113,25 @@ impl SceneText {
         if *position == NOWHERE || position.start >= self.stride {
             return problem;
         }
-        let place = self.place_in_text(position, message).unwrap_or_else(|| position.clone());
-        let value = AnnotationKind::Primary.span(place);
+        let value = AnnotationKind::Primary.span(position.clone());
         let lines = Snippet::source(self.file.as_str()).annotation(value);
         let lines = Renderer::plain().render(&[Group::with_level(Level::ERROR).element(lines)]);
         format!("{problem}\n{lines}")
     }
 
-    /// The place in a text of the file without escapes: the column, or the name, that the message about it calls wrong.
-    fn place_in_text(&self, position: &Range<usize>, message: &str) -> Option<Range<usize>> {
+    /// The position of a `place` in the text without escapes that ends at this position of the file.
+    pub(super) fn within(
+        &self,
+        position: &Range<usize>,
+        place: &Range<usize>,
+    ) -> Option<Range<usize>> {
         let value = self.file.get(position.clone())?;
-        let quote = value.chars().next_back().filter(|last| ['"', '\''].contains(last))?;
-        let start = value.find(quote)? + 1;
-        let text = value.get(start..value.len() - 1).filter(|text| !text.contains('\\'))?;
-        let (at, length) = if let Some((_, rest)) = message.split_once(" at column ") {
-            let column: usize = rest.split(' ').next()?.parse().ok()?;
-            let rest = text.char_indices().nth(column - 1);
-            rest.map_or((text.len(), 1), |(at, found)| (at, found.len_utf8()))
-        } else {
-            let name = message.split_once(" has the unknown ")?.1.split('`').nth(1)?;
-            let words = text.split(|c: char| !c.is_alphanumeric() && c != '_');
-            let word = words.into_iter().find(|word| *word == name)?;
-            (word.as_ptr().addr() - text.as_ptr().addr(), name.len())
-        };
-        let start = position.start + start + at;
-        Some(start..start + length)
+        let (rest, quote) =
+            value.strip_suffix(['"', '\'']).map(|rest| (rest, &value[rest.len()..]))?;
+        let (key, text) = rest.rsplit_once(quote).filter(|(_, text)| !text.contains('\\'))?;
+        let start = position.start + key.len() + 1;
+        (!place.is_empty() && place.start <= text.len())
+            .then(|| start + place.start..start + place.end)
     }
 
     /// The number of the line that contains the byte `at`.
@@ -170,10 +164,8 @@ impl SceneText {
     fn given_twice(&self, position: &Range<usize>) -> String {
         let key = self.file.get(position.clone()).unwrap_or_default();
         let is_closed = |line: &str| {
-            let value = line.trim_start().strip_prefix(key).map(str::trim_start);
-            value
-                .and_then(|value| value.strip_prefix('='))
-                .is_some_and(|v| v.trim_start().starts_with('{'))
+            let found = line.split_once('=').filter(|(name, _)| name.trim() == key);
+            found.is_some_and(|(_, value)| value.trim_start().starts_with('{'))
         };
         match self.file.lines().any(is_closed) {
             _ if LISTS.contains(&key) => format!("{key} is a list, each begins with [[{key}]]"),

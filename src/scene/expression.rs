@@ -12,6 +12,7 @@ use interval::{Enclosure, Enclosure2};
 use parser::Parser;
 use serde::Deserialize;
 use std::{
+    ops::Range,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -140,11 +141,17 @@ impl Expression {
         Self::from_toml(&text.into(), &Scope { folder: folder.to_owned(), ..Scope::default() })
     }
 
+    /// The reason why a text is not an expression, and its part, in bytes, that the reason is about; `None` if it is one.
+    pub(super) fn wrong_part(text: &str, scope: &Scope) -> Option<(String, Range<usize>)> {
+        Parser::parse(text, scope).err()
+    }
+
     /// The expression in a scene: a number, or a text as for [`Expression::parse_in`].
     pub(super) fn from_toml(written: &Value, scope: &Scope) -> Result<Self, ExpressionError> {
         match written {
             Value::String(text) => {
-                let program = Parser::parse(text, scope).map_err(ExpressionError)?;
+                let program =
+                    Parser::parse(text, scope).map_err(|(error, _)| ExpressionError(error))?;
                 let heights = program.iter().scan(0, |height, instruction| {
                     *height = *height + 1 - instruction.takes();
                     Some(*height)

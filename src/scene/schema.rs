@@ -119,7 +119,11 @@ impl<'t> Diagnostics<'t> {
             }
         };
         let read = read.unwrap_or_else(|problem| {
-            self.note(&key, problem);
+            let position = self.positions.get(&key).cloned().unwrap_or(NOWHERE);
+            let wrong = value.as_str().and_then(|text| Expression::wrong_part(text, &self.scope));
+            let wrong = wrong.filter(|(error, _)| problem.contains(error));
+            let part = wrong.and_then(|(_, place)| self.text.within(&position, &place));
+            self.problems.push((part.unwrap_or(position), format!("{key} {problem}")));
             false.into()
         });
         if self.problems.len() > before {

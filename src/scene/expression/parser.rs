@@ -8,6 +8,7 @@ use super::{
 use crate::suggestion::suggestion;
 use std::{
     f64::consts::{FRAC_PI_2, PI},
+    ops::Range,
     sync::Arc,
 };
 use toml::Value;
@@ -93,6 +94,8 @@ pub(super) struct Parser<'a> {
     scope: &'a Scope,
     /// The byte offset of the next character.
     at: usize,
+    /// What an error is about, bytes.
+    place: Range<usize>,
     depth: usize,
     program: Vec<Instruction>,
 }
@@ -101,20 +104,24 @@ pub(super) struct Parser<'a> {
 type Parsed = Result<(), String>;
 
 impl<'a> Parser<'a> {
-    /// The program of `text`.
-    pub(super) fn parse(text: &'a str, scope: &'a Scope) -> Result<Vec<Instruction>, String> {
-        if text.len() > MAX_LENGTH {
-            let length = text.len();
-            return Err(format!(
-                "is {length} bytes long, and {MAX_LENGTH} are allowed; shorten it, or use table(\"file.csv\")"
-            ));
-        }
-        let mut parser = Self { text, scope, at: 0, depth: 0, program: Vec::new() };
-        parser.whole()?;
+    /// The program of `text`, or what is wrong and where, bytes.
+    pub(super) fn parse(
+        text: &'a str,
+        scope: &'a Scope,
+    ) -> Result<Vec<Instruction>, (String, Range<usize>)> {
+        let (length, program) = (text.len(), Vec::new());
+        let mut parser = Self { text, scope, at: 0, place: 0..length, depth: 0, program };
+        parser.whole().map_err(|message| (message, parser.place.clone()))?;
         Ok(parser.program)
     }
 
     fn whole(&mut self) -> Parsed {
+        if self.text.len() > MAX_LENGTH {
+            let length = self.text.len();
+            return Err(format!(
+                "is {length} bytes long, and {MAX_LENGTH} are allowed; shorten it, or use table(\"file.csv\")"
+            ));
+        }
         if self.peek().is_none() {
             return Err("is empty; write a number or an expression in x, y, t".into());
         }
@@ -147,6 +154,7 @@ impl<'a> Parser<'a> {
             let compares = matches!(apply, Compare(_));
             if compared && compares {
                 let column = self.column();
+                self.place = self.at..self.at + symbol.len();
                 return Err(format!(
                     "compares a second time by `{symbol}` at column {column}; write `a < b and b < c`"
                 ));
@@ -169,6 +177,7 @@ impl<'a> Parser<'a> {
             self.expression(1)?;
             self.closing_bracket()
         } else if let Ok(value) = number.parse::<f64>() {
+            self.place = self.at..self.at + number.len();
             self.at += number.len();
             self.program.push(Number(value));
             match value.is_finite() {
@@ -186,7 +195,8 @@ impl<'a> Parser<'a> {
 
     /// Parses a variable, π, a constant, or a function with its arguments.
     fn name(&mut self, name: &str) -> Parsed {
-        self.at += name.len();
+        let place = self.at..self.at + name.len();
+        (self.at, self.place) = (place.end, place.clone());
         if let Some(table) = TABLES.into_iter().find(|(known, _)| *known == name) {
             return self.table(table);
         }
@@ -212,6 +222,7 @@ impl<'a> Parser<'a> {
             self.closing_bracket()?;
         }
         if given != takes {
+            self.place = place;
             let given = format!("calls `{name}` with {given} arguments");
             return Err(format!("{given}; it takes {takes}, in brackets"));
         }
@@ -285,7 +296,9 @@ impl<'a> Parser<'a> {
     }
 
     fn unexpected(&mut self, expected: &str) -> String {
-        let found = self.peek().map_or("the end".into(), |c| format!("`{c}`"));
+        let next = self.peek();
+        self.place = self.at..self.at + next.map_or(1, char::len_utf8);
+        let found = next.map_or("the end".into(), |c| format!("`{c}`"));
         let column = self.column();
         format!("has {found} at column {column} of the expression, where {expected} is expected")
     }
