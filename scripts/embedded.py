@@ -7,6 +7,7 @@ import signal
 # into errors of their own.
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 
+import argparse
 import importlib
 import io
 import json
@@ -71,6 +72,11 @@ def stop(number, frame):
     raise KeyboardInterrupt(128 + number)
 
 
+def refuse(parser, message):
+    """Ends with an error of the arguments in two lines, without the usage."""
+    parser.exit(2, f"error: {message}\n{parser.prog} --help says more\n")
+
+
 def unraisable(ignored):
     """Ends where Python cannot raise what `stop` raises, as while it removes an object, and would print a traceback."""
     if isinstance(ignored.exc_value, KeyboardInterrupt):
@@ -89,7 +95,7 @@ def program(name):
 
 
 name = sys.argv.pop(1)
-sys.unraisablehook = unraisable
+sys.unraisablehook, argparse.ArgumentParser.error = unraisable, refuse
 try:
     sys.stdout, sys.stderr = printable(sys.stdout, "surrogateescape"), printable(sys.stderr, "backslashreplace")
     sys.meta_path.insert(0, Sources(json.load(sys.stdin)))
@@ -112,5 +118,6 @@ except OSError as error:
 except Exception as error:
     # Each script refuses what it knows to be wrong, by name.
     code = 2
-    print(f"error: not as `run` writes results ({type(error).__name__}: {error}); run the scene again", file=sys.stderr)
+    print(f"error: results are damaged, or of another version ({type(error).__name__}: {error}); run the scene again",
+          file=sys.stderr)
 sys.exit(code)

@@ -32,7 +32,7 @@ def draw_curves(arguments):
             boundaries = boundaries_of(run, arguments.along)
             frames = {frame.time: frame for frame in map(run.frame, arguments.times or [None])}
             if missing := [f"{time:g}" for time in arguments.times or [] if not np.isclose(time, list(frames)).any()]:
-                print(f"{run.folder}: no frame at t = {', '.join(missing)}: the nearest are drawn", file=sys.stderr)
+                print(f"{run.folder}: there is no frame at t = {', '.join(missing)}; the nearest one is drawn", file=sys.stderr)
             for frame, boundary in product(frames.values(), boundaries):
                 places, values = _values(frame, arguments, boundary, quantity)
                 at = coordinate_of(run, boundaries)

@@ -255,7 +255,7 @@ def main(prog=None):
             last = runs[-1].frames[-1][0]
             asked = max([*filter(None, [arguments.time]), *(arguments.times or [])], default=last)
             if asked > last:
-                print(f"{folder}: the last frame is at t = {last:g}, before {asked:g}: it is drawn",
+                print(f"{folder}: there is no frame at t = {asked:g}; the last one, at t = {last:g}, is drawn",
                       file=sys.stderr)
         failed |= bool(problems)
     if arguments.together and runs:

@@ -66,7 +66,7 @@ def telling(folder=None):
     except OSError as error:
         problems.append(f"{error.filename or 'standard output'}: {error.strerror}")
     except Exception as error:
-        problems.append(f"{folder or 'these results'}: not as `run` writes results ({type(error).__name__}: {error}); run the "
+        problems.append(f"{folder or 'these results'}: damaged, or of another version ({type(error).__name__}: {error}); run the "
                         "scene again")
     for problem in problems:
         print(f"error: {problem}", file=sys.stderr)

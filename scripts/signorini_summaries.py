@@ -63,7 +63,7 @@ def read_summary(path):
         raise ValueError(f"{path}: it is damaged or cut off; run the scene again") from None
     wrong = next((key for key, kind in KINDS.items() if not is_of({key: kind}, summary)), None)
     if wrong or "steps" not in summary:
-        raise ValueError(f"{path}: {wrong or 'steps'} is not as `run` writes it; run the scene again")
+        raise ValueError(f"{path}: {wrong or 'steps'} is missing or has another form; run the scene again")
     return summary
 
 

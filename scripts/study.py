@@ -281,7 +281,7 @@ def stopping(pool, running):
         pool.shutdown(wait=False, cancel_futures=True)
         for server in list(running):
             server.send_signal(signal.SIGINT)
-        print("stopped; the same command goes on, with `-- --restart` also within the runs", file=sys.stderr)
+        print("stopped; run the same command again to go on; `-- --restart` at its end also continues unfinished runs", file=sys.stderr)
         raise
 
 

@@ -76,7 +76,7 @@ def draw_studies(folders, summaries, names, target, over=None, settings=None, fo
         absent = [row["run"] for row in rows if not isinstance(row[name], (int, float))]
         rows = [row for row in rows if row["run"] not in absent]
         if not rows:
-            raise ResultError(f"{name}: no run has a number")
+            raise ResultError(f"{name}: no run has a value of it")
         kept = ("run", key, *others, name, *(end for end in rows[0] if end.startswith(f"{name}.")), "status")
         with whole(table, is_own) as part:
             write_table([{column: row.get(column) for column in kept} for row in rows], part, units)

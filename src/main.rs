@@ -57,6 +57,11 @@ enum Command {
     Check(command::SceneArguments),
     /// Write the matrices, loads and constraints of a step as Matrix Market files, for other solvers.
     Export(command::ExportArguments),
+    /// Explain the topics that notes end with, or list all topics.
+    Explain {
+        /// The topics, e.g. singular.
+        topics: Vec<String>,
+    },
     /// Describe a folder of results: scene, program, outcome, errors, frames.
     Info(command::ScriptArguments),
     /// Run scenes with every contact solver and compare cost and answers.
@@ -158,6 +163,7 @@ fn execute() -> u8 {
         Command::New { list: true, .. } => command::list_gallery(),
         Command::New { name, from, .. } => command::new(name.as_deref(), from.as_deref()),
         Command::Check(arguments) => command::check(&arguments),
+        Command::Explain { topics } => command::explain(&topics),
         Command::Export(arguments) => command::export(&arguments),
         Command::Info(arguments) => command::script("info", &arguments),
         Command::Compare(arguments) => command::script("compare", &arguments),
@@ -193,6 +199,9 @@ fn refuse(error: clap::Error) -> u8 {
     let words = words().into_iter().map(|word| printable(&word.to_string_lossy()));
     let mut error = Arguments::try_parse_from(words).err().unwrap_or(error);
     suggest(&mut error);
+    for kind in [ContextKind::Usage, ContextKind::Suggested] {
+        error.remove(kind);
+    }
     keep(error.print());
     lost().iter().for_each(|error| command::tell("error", error));
     if lost().is_some() { 1 } else { error.exit_code() as u8 }

@@ -196,6 +196,7 @@ def expectation(discrete):
 def judge_frames(discrete, frames, output):
     """Verifies every frame: the damage step, then the contact step."""
     worst, scale, before = Verdict("right", ""), (0.0, 0.0), None
+    output = " ".join(output.split())  # a note has several lines
     damaged = "damage" in discrete.scene
     start = initial(discrete)
     for frame in frames:
@@ -221,7 +222,7 @@ def judge_frames(discrete, frames, output):
         if found.word == "imprecise" or found.difference > worst.difference:
             worst = found
         before = frame
-    told = re.search(r"exact only|cannot be estimated|one of many", output)
+    told = re.search(r"exact only|is unknown, as|one of many", output)
     if worst.word == "imprecise" and told:
         worst.word = "right"
     return worst

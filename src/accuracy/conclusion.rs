@@ -1,45 +1,39 @@
 //! The conclusion at the end of a run: whether the accuracy is reached, and the errors that the error bars do not contain.
 
-use super::{Adapted, Extreme, LoopState, first_mesh::kinks};
+use super::{Adapted, LoopState, first_mesh::kinks};
 use crate::{
-    evolution::{Outcome, Step, percent},
+    evolution::{Outcome, percent},
     mesh::Order,
-    observe::{Bar, ObservedProblem},
+    observe::ObservedProblem,
 };
 
 impl LoopState {
-    /// Is the required accuracy reached? With the closing line: the mesh, and the errors that are too large. `None` without
+    /// Is the required accuracy reached? With the closing lines: the answer, the reasons why not, and the mesh. `None` without
     /// a required accuracy. A run that failed has no outcome.
     pub fn conclusion(
         &self,
         problem: &ObservedProblem,
         outcome: Option<&Outcome>,
-    ) -> Option<(bool, String)> {
+    ) -> Option<(bool, Vec<String>)> {
         let (adapted, scene) = (self.adapted.as_ref()?, problem.scene());
         let accuracy = scene.accuracy?;
-        let (triangles, rounds) = (adapted.mesh.triangles.len(), adapted.rounds);
         let degree = if scene.order == Order::Quadratic { 2 } else { 1 };
-        let mesh = format!(
-            "P{degree} on {triangles} triangles, mesh {rounds} of those tried (kept as mesh.msh)"
-        );
+        let triangles = adapted.mesh.triangles.len();
+        let mesh =
+            format!("the mesh is kept as mesh.msh: {triangles} triangles of degree {degree}");
         let asked = match &scene.accuracy_of[..] {
             [] => format!("accuracy {accuracy}"),
             names => format!("accuracy {accuracy} of {}", names.join(", ")),
         };
-        let Some(outcome) = outcome else { return Some((false, format!("{asked}: {mesh}"))) };
+        let Some(outcome) = outcome else {
+            return Some((false, vec![asked + " NOT reached", mesh]));
+        };
         let reasons = self.reasons(adapted, accuracy, problem, outcome);
         let of_time = if outcome.stopped.is_some() { " in the time of ζ_*" } else { "" };
-        let probes: Vec<_> =
-            scene.probes.iter().map(|probe| format!("{}.von_mises", probe.name)).collect();
-        let at_probe = |bar: &&Bar| probes.contains(&bar.name);
-        let stresses = outcome.bars.iter().find(at_probe).map_or_else(String::new, |bar| {
-            format!(" (stresses at probes: of {:.1e} {})", bar.scale, scene.units.stress)
-        });
-        let note = match reasons.is_empty() {
-            true => format!("{asked} reached{of_time}{stresses}: {mesh}"),
-            false => format!("{asked} NOT reached ({}): {mesh}", reasons.join("; ")),
-        };
-        Some((reasons.is_empty(), note))
+        let reached = reasons.is_empty();
+        let answer = if reached { format!("reached{of_time}") } else { "NOT reached".to_owned() };
+        let lines = [format!("{asked} {answer}")].into_iter().chain(reasons);
+        Some((reached, lines.chain([mesh]).collect()))
     }
 
     /// The reasons why the accuracy is not reached; none if it is.
@@ -60,23 +54,23 @@ impl LoopState {
         let worst = bars.chain(norms.cloned()).chain(of_stop).max_by(|a, b| a.1.total_cmp(&b.1));
         let missed = worst.filter(|(_, error)| *error > accuracy).map(|(name, error)| {
             let error = match percent(error) {
-                _ if !error.is_finite() => "?".to_owned(),
+                _ if !error.is_finite() => "unknown".to_owned(),
                 same if same == percent(accuracy) => format!("{:.3} %", 100.0 * error),
                 percent => percent,
             };
-            format!("{name} is exact to {error} only")
+            format!("the error of {name} is {error}")
         });
         let unconfirmed = self.is_unconfirmed_stop(outcome);
         let unconfirmed = unconfirmed
-            .then_some("only this run stops at ζ_*, not the runs that measure its errors");
+            .then_some("only this run stops at ζ_*; the runs that measure its error do not");
         // Only the limit on the time prevents a repetition.
         let is_last = self.is_last(outcome, accuracy)
             || outcome.shorter_steps(problem, &self.measured).is_none();
-        let limit = (!is_last)
-            .then_some("a repetition with shorter steps would take longer than --max-seconds");
+        let limit =
+            (!is_last).then_some("shorter time steps would take longer than --max-seconds allows");
         let may_stop = outcome
             .may_stop
-            .map(|_| "within the error of the time steps, ζ_* may have been reached");
+            .map(|_| "ζ may have reached ζ_*: the time steps are too long to exclude it");
         let of_run = [unconfirmed, may_stop, limit].into_iter().flatten().map(str::to_owned);
         let of_mesh = missed.into_iter().chain(adapted.not_reached.clone());
         of_mesh.chain(of_run).chain(self.missing_bars(outcome)).collect()
@@ -86,7 +80,6 @@ impl LoopState {
     pub fn notes(&self, problem: &ObservedProblem, outcome: Option<&Outcome>) -> Vec<String> {
         let is_fixed = self.adapted.is_none();
         let notes = [
-            self.conclusion(problem, outcome).map(|(_, note)| note),
             self.kinks(problem),
             outcome.filter(|_| is_fixed).and_then(|outcome| self.missing_bars(outcome)),
         ];
@@ -97,7 +90,8 @@ impl LoopState {
     fn missing_bars(&self, outcome: &Outcome) -> Option<String> {
         let is_missing = outcome.stopped.is_none() && outcome.bars.is_empty();
         (is_missing && self.measured.stop.is_some()).then(|| {
-            "no error bars: with few time steps, or on a finer mesh, the run stops at ζ_*"
+            "no error bars: a run that measures them stops at ζ_*, and this run does not; refine the mesh or shorten the \
+             time steps (explain bars)"
                 .to_owned()
         })
     }
@@ -111,27 +105,9 @@ impl LoopState {
         let (_, kink) = kinks.max_by(|(a, p), (b, q)| (p.angle / a).total_cmp(&(q.angle / b)))?;
         let at = mesh.place(mesh.nodes[kink.node]);
         Some(format!(
-            "curved edges meet at {at} at an angle of {:.1e}°: if the curve is smooth there, the bars do not \
-             contain the error of its shape; set smaller sizes there in the .geo",
+            "curved edges meet at {at} at an angle of {:.1e}°: if the curve is smooth there, the bars do not hold the \
+             error of its shape; set smaller sizes there in the .geo (explain meshes)",
             kink.angle.to_degrees()
         ))
     }
-}
-
-/// A note on the `extremes` of the `last` state of a sound body with a singular stress. On finer meshes this stress grows and may
-/// exceed the threshold of the damage, which no error bar shows.
-pub fn notes_on_extremes(
-    problem: &ObservedProblem,
-    last: &Step,
-    extremes: &[Extreme],
-) -> Vec<String> {
-    let is_sound = problem.damage().is_some() && last.record.zeta_min == 1.0;
-    let point = extremes.iter().find_map(|of| of.singular.as_ref()).filter(|_| is_sound);
-    let hidden = point.map(|point| {
-        format!(
-            "no damage on this mesh, but the stress is singular at {point}: on finer ones it may exceed the threshold of \
-             the damage there, which the error bars do not contain"
-        )
-    });
-    hidden.into_iter().collect()
 }

@@ -45,7 +45,6 @@ use crate::{
 };
 pub use answer::INSTANTS;
 use answer::{Answer, FEW, FewStepRun};
-pub use conclusion::notes_on_extremes;
 pub use extremes::{BY_DIRECTION, Extreme, Extremes};
 pub use first_mesh::first_mesh;
 use limits::Limits;
@@ -108,8 +107,8 @@ pub enum AdaptError {
     Mesh(#[from] MeshError),
     /// A run with few steps failed.
     #[error(
-        "a run on {triangles} triangles, for the accuracy or the error bars: {source}; to keep the results up to \
-         this error, ask for neither"
+        "a run on {triangles} triangles that measures errors failed: {source}; without --accuracy and --bars you get the \
+         results up to this failure"
     )]
     Run {
         /// The triangles of its mesh.

@@ -70,7 +70,7 @@ impl LoopState {
     ) -> Result<Measured, AdaptError> {
         // A mesh that was adapted is so fine that it does not lock.
         if of_steps.is_none() && locks(scene).is_some() {
-            let note = "no error bars: a finer mesh does not show that linear triangles lock";
+            let note = "no error bars: a finer mesh does not show that linear triangles lock (explain locking)";
             self.notes.push(note.to_owned());
             return Ok(Measured::default());
         }
@@ -79,7 +79,8 @@ impl LoopState {
         match measured_errors(session, scene, [mesh, &curved], &RunOptions::of(scene), of_steps) {
             // The scene fits this mesh, perhaps not the finer one.
             Err(error) if error.signal().is_none() => {
-                self.notes.push(format!("the error bars could not be measured: {error}"));
+                self.notes
+                    .push(format!("the error bars could not be measured: {error} (explain bars)"));
                 Ok(Measured::default())
             }
             measured => measured,

@@ -33,12 +33,18 @@ impl DiscreteProblem {
     /// materials or triangles that make the discretisation poor.
     pub fn notes(&self) -> Vec<String> {
         let (scene, linear) = (self.scene(), self.scene().order == Order::Linear);
-        let mut notes = self.mesh().notes.clone();
+        let mut notes =
+            Vec::from_iter(self.mesh().notes.iter().map(|note| format!("{note} (explain meshes)")));
         notes.extend(scene.time.and_then(|grid| grid.note()));
         notes.extend(self.motions.free.iter().map(|motion| {
-            format!("nothing prevents or drives {motion}: the answer given is the one with the least ∫|u|²")
+            format!(
+                "nothing prevents {motion}, and no load drives it: of all answers this one has the least ∫|u|² \
+                 (explain collapse)"
+            )
         }));
-        let check_units = |contrast| format!("{contrast}; if that is not meant, check their units");
+        let check_units = |contrast| {
+            format!("{contrast}; if that is not meant, check their units (explain large-rotation)")
+        };
         notes.extend(self.contrast().map(check_units));
         notes.extend(unresolved::notes(scene, self.mesh()));
         notes.extend(self.loads.notes(&scene.sample_times(SAMPLE_TIMES)));
@@ -46,33 +52,33 @@ impl DiscreteProblem {
             LoadCurve::unresolved_step(self).map(|[start, end]| {
                 format!(
                     "loads, displacements or gaps change within a time step, as from t = {start:.4e} \
-                     to {end:.4e}: shorten time.step, or set it to \"auto\""
+                     to {end:.4e}: shorten time.step, or set it to \"auto\" (explain loads)"
                 )
             }),
             scene.units.contradiction(),
             self.large_load(),
             (scene.materials().any(|material| material.density > 0.0)
                 && scene.gravity.iter().all(|g| g.as_constant() == Some(0.0)))
-            .then(|| "material.density has no effect without body.gravity".to_owned()),
+            .then(|| "material.density has no effect without body.gravity; set it (explain loads)".to_owned()),
             (scene.output.every == Some(0) && !scene.output.times.is_empty()).then(|| {
-                "output.every = 0 writes no frames, also at output.times: only contact.csv has these times"
+                "output.every = 0 writes no frames, so only contact.csv has the output.times (explain pictures)"
                     .to_owned()
             }),
             (scene.damage.is_some() && scene.time.is_none()).then(|| {
-                "[damage] without [time]: in this static solve ζ stays damage.initial".to_owned()
+                "[damage] has no effect without [time]: in a static solve ζ stays damage.initial; add [time]".to_owned()
             }),
             locks(scene).map(|poisson| {
                 format!(
                     "linear triangles lock in plane strain with ν = {poisson} > {LOCKING}: displacements \
-                     may be far too small; set discretisation.displacement = 2"
+                     may be far too small; set discretisation.displacement = 2 (explain locking)"
                 )
             }),
             (linear && !self.mesh().curved.is_empty()).then(|| {
-                "curved sides count as straight; discretisation.displacement = 2 follows them".to_owned()
+                "curved sides are taken as straight; set discretisation.displacement = 2 (explain meshes)".to_owned()
             }),
             self.collapse_on_a_point().map(|_| {
                 "just before the body turns over, the contact shrinks to a point: displacements and stresses at \
-                 the end grow as the mesh is refined"
+                 the end grow as the mesh is refined; set an earlier time.end (explain collapse)"
                     .to_owned()
             }),
             self.overlap(),
@@ -100,7 +106,8 @@ impl DiscreteProblem {
         let note = format!(
             "the load {load:.1e} {unit} on `{name}` is more than a tenth of E = {young:e} {unit}"
         );
-        (load > LARGE_LOAD * young).then(|| note + ": are the units consistent?")
+        (load > LARGE_LOAD * young)
+            .then(|| note + ": are the units consistent? (explain large-rotation)")
     }
 
     /// A note on the foundation that overlaps the body most at the start, as for a press fit.
@@ -120,7 +127,7 @@ impl DiscreteProblem {
         (least < -OVERLAP * extent(&mesh.nodes)).then(|| {
             format!(
                 "the body starts up to {:.3e} {} inside the foundation of `{name}` (a negative gap, as for a \
-                 press fit)",
+                 press fit); if that is not meant, check the sign of the gap (explain penetration)",
                 -least,
                 self.scene().units.length
             )
@@ -152,7 +159,7 @@ impl DiscreteProblem {
         let (angle, at) = self.mesh().smallest_angle();
         let at = self.mesh().place(at);
         (angle < SLIVER).then(|| {
-            format!("a triangle at {at} has an angle of {angle:.1e}°: mend the mesh there")
+            format!("a triangle at {at} has an angle of {angle:.1e}°: mend the mesh there (explain meshes)")
         })
     }
 }

@@ -127,8 +127,9 @@ impl ObservedProblem {
         let Penetration { depth, at, boundary, .. } = deepest;
         (noted_below > displacement).then(|| {
             format!(
-                "between its nodes boundary \"{}\" lies {depth:.1e} in the foundation at {}, {:.2} % of the largest \
-                 displacement: displacements and forces may be far off; refine the mesh there, or set accuracy",
+                "between its nodes, boundary \"{}\" enters the foundation by {depth:.1e} at {}, {:.2} % of the largest \
+                 displacement, so that displacements and forces may be far off; refine the mesh there, or set accuracy \
+                 (explain penetration)",
                 self.scene().boundaries[boundary].name,
                 self.mesh().place(at),
                 100.0 * depth / displacement

@@ -97,7 +97,7 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
             let at = mesh.place(mesh.midpoint(*edge));
             notes.push(format!(
                 "the displacement of boundary \"{}\" varies within the mesh's edges near {at}: \
-                 up to {missed:.1e} {} of it is missed, of {largest:.1e} at most; refine there",
+                 up to {missed:.1e} {} of it is missed, of {largest:.1e} at most; refine the mesh there (explain penetration)",
                 boundary.name, scene.units.length
             ));
         }
@@ -113,7 +113,7 @@ pub(super) fn notes(scene: &Scene, mesh: &Mesh) -> Vec<String> {
         let shown = if damage.shown > 1e-9 * damage.integral { damage.shown } else { 0.0 };
         notes.push(format!(
             "the initial damage varies within the mesh's triangles near {at}: ∫(1 − ζ) is {:.3e} \
-             on this mesh, integrated finely {:.3e}; refine there",
+             on this mesh, integrated finely {:.3e}; refine the mesh there (explain penetration)",
             shown, damage.integral
         ));
     }

@@ -24,27 +24,26 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     let mesh = read_mesh(&scene, false)?;
     scene.check_mesh(&mesh).map_err(Failure::input)?;
     say(&scene.title);
-    say(&row("mesh", describe_mesh(&mesh, &scene.units)));
+    let (nodes, triangles) = (mesh.nodes.len(), mesh.triangles.len());
+    let (width, length) = (plain(extent(&mesh.nodes), 5), &scene.units.length);
+    let angle = mesh.smallest_angle().0;
+    let of_mesh = format!(
+        "{nodes} vertices, {triangles} triangles, up to {width} {length} wide, angles from {angle:.0}°"
+    );
+    say(&row("mesh", &of_mesh));
     say(&materials(&scene).join("\n"));
     say(&boundaries(&scene, &mesh));
     let problem = ObservedProblem::new(scene, mesh).map_err(Failure::input)?;
-    let mut lines = vec![row("unknowns", unknowns(&problem))];
+    let (of_u, contact) = (2 * problem.body.nodes.points.len(), contact_nodes(&problem));
+    let of_damage = problem.damage().map_or(0, |_| problem.body.mesh.nodes.len());
+    let unknowns = format!("{of_u} of u, {of_damage} of ζ; {contact} nodes with a gap");
+    let mut lines = vec![row("unknowns", &unknowns)];
     lines.extend(loads(&problem));
     lines.extend(support(&problem));
-    lines.push(row("cost", cost(&problem)));
-    lines.extend(notes.into_iter().chain(problem.notes()).map(|note| row("note", note)));
+    lines.push(row("cost", &cost(&problem)));
+    lines.extend(notes.into_iter().chain(problem.notes()).map(|note| row("note", &note)));
     say(&lines.join("\n"));
     Ok(())
-}
-
-fn describe_mesh(mesh: &Mesh, Units { length, .. }: &Units) -> String {
-    format!(
-        "{} vertices, {} triangles, up to {} {length} wide, angles from {:.0}°",
-        mesh.nodes.len(),
-        mesh.triangles.len(),
-        plain(extent(&mesh.nodes), 5),
-        mesh.smallest_angle().0
-    )
 }
 
 /// The materials: that of [material], and those of the surfaces by name.
@@ -59,8 +58,8 @@ fn materials(scene: &Scene) -> Vec<String> {
             words += &format!(", ρ = {}", plain(material.density, 5));
         }
         match name {
-            "" => row("material", words),
-            name => row("", format!("{name}: {words}")),
+            "" => row("material", &words),
+            name => row("", &format!("{name}: {words}")),
         }
     };
     let all: Vec<_> = scene.materials().collect();
@@ -138,13 +137,6 @@ pub(super) fn contact_nodes(problem: &ObservedProblem) -> usize {
     problem.constraints.bounds.chunk_by(|a, b| a.node == b.node).count()
 }
 
-fn unknowns(problem: &ObservedProblem) -> String {
-    let nodes = problem.body.nodes.points.len();
-    let damage = problem.damage().map_or(0, |_| problem.body.mesh.nodes.len());
-    let contact = contact_nodes(problem);
-    format!("{} displacements, {damage} of the damage; {contact} nodes of Γ_C", 2 * nodes)
-}
-
 /// The resultants of the loads at the start and at the end.
 fn loads(problem: &ObservedProblem) -> Vec<String> {
     let Units { length, force, .. } = &problem.scene().units;
@@ -157,7 +149,7 @@ fn loads(problem: &ObservedProblem) -> Vec<String> {
         let [x, y] = [sum(|f, _| f[0]), sum(|f, _| f[1])];
         let moment = sum(|f, [x, y]| x * f[1] - y * f[0]);
         let moment = format!("moment about (0, 0) {moment} {force}");
-        row("loads", format!("t = {}: ({x}, {y}) {force}/{length}, {moment}", rounded(t)))
+        row("loads", &format!("t = {}: ({x}, {y}) {force}/{length}, {moment}", rounded(t)))
     };
     problem.scene().sample_times(1).into_iter().map(line).collect()
 }
@@ -166,19 +158,15 @@ fn loads(problem: &ObservedProblem) -> Vec<String> {
 fn support(problem: &ObservedProblem) -> Vec<String> {
     let motions = &problem.motions;
     if motions.all_prevented() {
-        let words = "the boundary conditions prevent all rigid motions";
-        return vec![row("support", words.to_owned())];
+        return vec![row("support", "the boundary conditions prevent all rigid motions")];
     }
-    let by_contact = |motion| format!("only contact supports the body against {motion}, one way");
+    let by_contact = |motion| format!("contact alone stops {motion}, and in one direction only");
     let stands = problem.collapse.map(|Collapse { time, motion }| {
         let time = rounded(time);
-        row(
-            "support",
-            format!("stands up to t = {time}; then nothing supports it against {motion}"),
-        )
+        format!("stands up to t = {time}; then nothing supports it against {motion}")
     });
-    let resisted = motions.resisted.iter().map(|motion| row("support", by_contact(motion)));
-    resisted.chain(stands).collect()
+    let facts = motions.resisted.iter().map(by_contact).chain(stands);
+    facts.map(|fact| row("support", &fact)).collect()
 }
 
 /// The approximate time and memory of a run on one rank: time within a factor of two, memory within a fifth.
@@ -203,9 +191,11 @@ fn cost(problem: &ObservedProblem) -> String {
         Some(Stepping::Uniform { steps }) => {
             let moving = 3.0 * step + 0.65e-9 * contact.powi(3);
             let [least, most] = [step, moving].map(|step| once + steps as f64 * step);
-            format!("{least:.1} s in {steps} steps, or {most:.1} s if contact moves")
+            format!(
+                "{least:.1} s in {steps} steps, or {most:.1} s if the contact changes in each step"
+            )
         }
         Some(Stepping::Auto { .. }) => format!("{once:.1} s and {:.1} ms a step", 1e3 * step),
     };
-    format!("about {seconds}; about {megabytes:.0} MB; --bars about {bars:.1} s more")
+    format!("about {seconds}; about {megabytes:.0} MB; --bars adds about {bars:.1} s")
 }

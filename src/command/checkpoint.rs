@@ -56,8 +56,8 @@ fn origin(task: &Task) -> [u64; 3] {
 /// Per hash: the message if it differs.
 const DIFFERENCES: [&str; 3] = [
     "another build of the program wrote it",
-    "the scene, its tables, --set, --solver or PETSc's options are others",
-    "the mesh is another",
+    "the scene, its tables, --set, --solver or PETSc's options have changed",
+    "the mesh has changed",
 ];
 
 fn hash(bytes: &[u8]) -> u64 {
@@ -93,7 +93,7 @@ impl Checkpoint {
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
         let rest = bytes.strip_prefix(FORMAT).ok_or("it is no checkpoint of this version")?;
-        let (expected, content) = rest.split_first_chunk().ok_or("it is cut off")?;
+        let (expected, content) = rest.split_first_chunk().ok_or("the file is cut off")?;
         if *expected != hash(content).to_le_bytes() {
             return Err("it is damaged".to_owned());
         }

@@ -74,7 +74,7 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
         .map_err(Failure::input)?;
     let (mut scene, _) = scene.read(&[])?;
     let mesh = read_mesh(&scene, true)?;
-    let (_, mesh) = accuracy_loop(session, &mut scene, mesh, (false, None))?;
+    let (_, mesh) = accuracy_loop(session, &mut scene, mesh, (false, None), false)?;
     let problem = ObservedProblem::new(scene, mesh).map_err(Failure::input)?;
     let mut states = Vec::new();
     let mut keep = |step: &Step| {
@@ -108,7 +108,8 @@ fn run(arguments: &ExportArguments, session: &Session) -> Result<(), Failure> {
     stale.for_each(|name| drop(fs::remove_file(out.join(name))));
     files.iter().try_for_each(|(name, text)| write_whole(&out.join(name), text.as_bytes()))?;
     let end = rounded(states[0].time);
-    say(&screen::row("results", format!("t = {end}: {}/README.md names them", out.display())));
+    let files = format!("t = {end}: {}/README.md names them", out.display());
+    say(&screen::row("results", &files));
     Ok(())
 }
 

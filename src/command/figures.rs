@@ -6,9 +6,11 @@ use signorini::{
     accuracy::{BY_DIRECTION, Extreme},
     evolution::{GoverningValue, Outcome, Step},
     mesh::Mesh,
-    observe::{Dimension, Figure, Of},
+    observe::{Bar, Dimension, Figure, ObservedProblem, Of},
     output::terminal::{plain, with_bar},
+    scene::rounded,
 };
+use std::collections::BTreeSet;
 
 /// A figure of the last state.
 #[derive(Serialize)]
@@ -16,11 +18,14 @@ pub(super) struct LastFigure<'a> {
     #[serde(skip)]
     pub(super) figure: &'a Figure,
     label: &'a str,
-    pub(super) unit: String,
+    unit: String,
     /// In `summary.json` it is null if there is no such place, as without contact.
-    pub(super) value: f64,
+    value: f64,
     /// The error bar, if the errors were measured and the mesh determines the figure.
     bar: Option<f64>,
+    /// Is the value zero within its bar, and this bar the solver's tolerance?
+    #[serde(skip)]
+    is_zero: bool,
     /// Its place, m, if it is found at one.
     at: Option<[f64; 2]>,
     /// Why the mesh does not determine an extreme.
@@ -52,8 +57,27 @@ pub(super) struct LastFigures<'a> {
     of_stress: usize,
 }
 
+/// A bar below this fraction of the scale of its figure is the solver's tolerance.
+const SMALLEST_PART: f64 = 1e-6;
+
 /// The extreme of a run is shown if it differs by more than this fraction from the last value.
 const DIFFERENT: f64 = 1e-3;
+
+/// A fact of the screen under the name of its group.
+pub(super) type Fact = (&'static str, String);
+
+/// The name under which the screen shows a figure.
+fn group(figure: &Figure) -> &'static str {
+    match (&figure.of, figure.dimension) {
+        (Of::Probe(_), _) => "probe",
+        (Of::Boundary(_), _) => "boundary",
+        (_, Dimension::Zeta | Dimension::OfZeta) => "damage",
+        (_, Dimension::Length) => "displacement",
+        (_, Dimension::Work) => "work",
+        (_, Dimension::Stress) if !figure.is_pressure() => "stress",
+        _ => "contact",
+    }
+}
 
 impl<'a> LastFigures<'a> {
     /// The figures of the step `last` of a run, whose `extremes` the mesh may not determine.
@@ -68,13 +92,17 @@ impl<'a> LastFigures<'a> {
         let bars = outcome.map_or(&[][..], |outcome| &outcome.bars);
         let figure = |(i, figure): (usize, &'a Figure)| {
             let extreme = extremes.iter().find(|of| of.name == figure.name);
-            let bar = bars.iter().find(|bar| bar.name == figure.name).map(|bar| bar.bar);
+            let bar = bars.iter().find(|bar| bar.name == figure.name);
+            let is_zero = |bar: &Bar| {
+                last.figures[i].value.abs() <= bar.bar && bar.relative() < SMALLEST_PART
+            };
             LastFigure {
                 figure,
                 label: &figure.label,
                 unit: figure.dimension.unit(units),
                 value: last.figures[i].value,
-                bar: bar.filter(|_| {
+                is_zero: bar.is_some_and(is_zero),
+                bar: bar.map(|bar| bar.bar).filter(|_| {
                     extreme.is_none_or(Extreme::is_known) && !last.figures[i].value.is_nan()
                 }),
                 at: last.figures[i].at,
@@ -95,58 +123,105 @@ impl<'a> LastFigures<'a> {
         }
     }
 
-    /// A figure by its name.
-    pub(super) fn get(&self, name: &str) -> Option<&LastFigure<'a>> {
-        self.all.iter().find(|of| of.figure.name == name)
+    /// The facts about the last state, which is that of a `step`. Displacements of boundaries are for experts.
+    pub(super) fn facts(&self, task: &Task, step: usize) -> Vec<Fact> {
+        let (problem, figures) = (&task.problem, &self.all);
+        let is_sound = self.is_sound();
+        // A lone foundation has the pressure of the whole.
+        let several = problem.foundations.len() > 1;
+        let fact = |(i, of): (usize, &LastFigure)| {
+            let group = group(of.figure);
+            let is_shown = match (group, of.figure.kind) {
+                _ if of.value.is_nan() || of.label.ends_with(", y") => false,
+                ("damage", "zeta_min") if is_sound && step == 1 && problem.damage().is_some() => {
+                    let why = "none yet: it begins in the second step; set a shorter time.step";
+                    return Some((group, why.to_owned()));
+                }
+                ("damage", "zeta_min") if is_sound => return Some((group, "none".to_owned())),
+                ("damage", _) => !is_sound,
+                ("boundary", "pressure_max" | "contact_length") if !several => false,
+                (_, "pressure_max") => of.value != 0.0,
+                ("contact", _) => task.contact_nodes > 0,
+                ("boundary", "u_x" | "travel" | "peak_x") => task.verbose,
+                ("probe", "zeta") => problem.scene().damage.is_some(),
+                _ => true,
+            };
+            is_shown.then(|| (group, self.fact(i)))
+        };
+        figures.iter().enumerate().filter_map(fact).collect()
     }
 
-    /// A value by the name of its figure; NaN if there is no such figure.
-    pub(super) fn value(&self, name: &str) -> f64 {
-        self.get(name).map_or(f64::NAN, |of| of.value)
-    }
-
-    /// A figure with its bar or, without one, with the digits that it deserves; "" if there is no such figure.
-    pub(super) fn text(&self, name: &str) -> String {
-        self.get(name).map_or_else(String::new, |of| self.written(of, of.value))
-    }
-
-    /// As [`Self::text`], with its unit, and an extreme also with its place and why the mesh does not determine it.
-    pub(super) fn full_text(&self, name: &str) -> String {
-        let Some(of) = self.get(name) else { return String::new() };
+    /// A figure with its label, its bar or the digits that it deserves, and its unit; an extreme also with its place and why the
+    /// mesh does not determine it. Two components are one fact.
+    fn fact(&self, i: usize) -> String {
+        let of = &self.all[i];
+        let text = |of: &LastFigure| self.written(of, of.value);
+        let (label, text) = match (of.label.strip_suffix(", x"), self.all.get(i + 1)) {
+            (Some(label), Some(y)) if of.figure.dimension == Dimension::Place => {
+                return format!("{label} {}", self.mesh.place([of.value, y.value]));
+            }
+            (Some(label), Some(y)) => (label, format!("({}, {})", text(of), text(y))),
+            _ => (of.label, text(of)),
+        };
         let at = of.at.filter(|_| of.figure.is_extreme());
         let at = at.map_or_else(String::new, |at| format!(" at {}", self.mesh.place(at)));
-        format!("{} {}{at}{}", self.written(of, of.value), of.unit, of.reason())
+        let fact = format!("{label} {text} {}", of.unit);
+        format!("{}{at}{}", fact.trim_end(), of.reason())
     }
 
     fn written(&self, of: &LastFigure, value: f64) -> String {
         match of.bar {
             _ if !of.reason().is_empty() => plain(value, 2),
+            Some(_) if of.is_zero => "0".to_owned(),
             Some(bar) => with_bar(value, Some(bar)),
             None if of.figure.is_extreme() => plain(value, self.of_stress),
             None => plain(value, self.digits),
         }
     }
 
-    /// The reason why an extreme is singular, if it is.
-    pub(super) fn singular(&self, name: &str) -> Option<&str> {
-        self.get(name)?.singular.as_deref()
+    fn is_sound(&self) -> bool {
+        self.all.iter().any(|of| of.figure.name == "zeta_min" && of.value == 1.0)
     }
 
-    /// The place with the coordinates `KIND_x` and `KIND_y`; `None` if there is none.
-    pub(super) fn place(&self, kind: &str) -> Option<String> {
-        let place = ["x", "y"].map(|axis| self.value(&format!("{kind}_{axis}")));
-        place[0].is_finite().then(|| self.mesh.place(place))
+    /// Notes on the extremes that the mesh does not determine, by their reasons.
+    pub(super) fn notes(&self, problem: &ObservedProblem) -> Vec<String> {
+        let all = |reason: fn(&LastFigure) -> Option<String>| {
+            BTreeSet::from_iter(self.all.iter().filter_map(reason))
+        };
+        let mut notes = Vec::new();
+        let places = Vec::from_iter(all(|of| of.singular.clone()));
+        if !places.is_empty() {
+            let mut note = format!(
+                "stresses grow without limit as the mesh is refined at {}",
+                places.join(", ")
+            );
+            if self.is_sound() && problem.damage().is_some() {
+                note += ", so that damage may begin there on finer meshes";
+            }
+            let has_away = self.all.iter().any(|of| of.figure.is_away());
+            if let Some(length) = problem.proposed_distance().filter(|_| !has_away) {
+                let (length, unit) = (plain(length, 1), &problem.scene().units.length);
+                note += &format!(
+                    "; `away = {length}` in the scene adds the extremes {length} {unit} away from there"
+                );
+            }
+            notes.push(note + " (explain singular)");
+        }
+        let coarse = all(|of| of.unresolved.clone().filter(|of| of != BY_DIRECTION));
+        notes.extend(
+            coarse.iter().map(|reason| format!("not resolved: {reason} (explain not-resolved)")),
+        );
+        notes
     }
 
-    /// The extremes in the run of figures of the body and of contact, where they differ from the last values: the label, the
-    /// extreme and its time.
-    pub(super) fn governing(&self) -> impl Iterator<Item = (&str, String, f64)> {
+    /// The extremes in the run of figures of the body and of contact, where they differ from the last values: with their times.
+    pub(super) fn governing(&self) -> impl Iterator<Item = String> {
         // A lone foundation has the pressure of the whole.
         let several = self.all.iter().filter(|of| of.figure.is_pressure()).count() > 2;
-        let is_asked = move |of: &&LastFigure| match (&of.figure.of, of.figure.dimension) {
-            (Of::Body | Of::Material(_), _) | (Of::Boundary(_), Dimension::Force) => true,
-            (Of::Boundary(_), _) => of.figure.is_pressure() && several,
-            (Of::Probe(_), _) => false,
+        let is_asked = move |of: &&LastFigure| match (group(of.figure), of.figure.dimension) {
+            ("boundary", Dimension::Force) => true,
+            ("boundary", _) => of.figure.is_pressure() && several,
+            (group, _) => group != "probe",
         };
         self.all.iter().filter(is_asked).filter_map(|of| {
             let governing = of.governing?;
@@ -163,7 +238,7 @@ impl<'a> LastFigures<'a> {
             let change = (governing.value - of.value).abs();
             let differs = change > DIFFERENT * scale[0].max(scale[1])
                 && plain(governing.value, digits) != plain(of.value, digits);
-            differs.then(|| (of.label, value(), governing.time))
+            differs.then(|| format!("{} {} (t = {})", of.label, value(), rounded(governing.time)))
         })
     }
 }

@@ -9,6 +9,7 @@
 mod check;
 mod checkpoint;
 mod ending;
+mod explain;
 mod export;
 mod figures;
 mod new;
@@ -24,6 +25,7 @@ mod task;
 
 pub use check::check;
 pub use ending::{install, out_of_memory, watch};
+pub use explain::explain;
 pub use export::{ExportArguments, export};
 pub use new::{list_gallery, new};
 pub use provenance::version;

@@ -3,14 +3,13 @@
 use super::{
     checkpoint::{self, Checkpoint, Recorded},
     figures::LastFigures,
-    ranks::paying,
     screen,
     summary::summary,
     task::Task,
 };
 use serde_json::json;
 use signorini::{
-    accuracy::{Extremes, notes_on_extremes},
+    accuracy::Extremes,
     evolution::{Next, Observed, Observer, Outcome, RunError, RunState, Step, StepRecord},
     interrupt::received,
     memory,
@@ -39,6 +38,8 @@ pub(super) struct Recorder<'a> {
     /// The numbers of the figures that a [`StepRecord`] does not have: the columns after it.
     added: Vec<usize>,
     last: Option<Step>,
+    /// The iterations of the contact solver, and of the linear solvers in it.
+    iterations: [usize; 2],
     /// The time of the last checkpoint.
     saved: Instant,
 }
@@ -56,7 +57,7 @@ impl<'a> Recorder<'a> {
         let more = added.iter().map(|&number| task.problem.figures[number].name.as_str());
         let more = Vec::from_iter(more.chain(["seconds"]));
         let history = Table::new(task.folder.join("history.csv"), &StepRecord::default(), &more)?;
-        Ok(Self { task, fields, progress, history, added, last: None, saved })
+        Ok(Self { task, fields, progress, history, added, last: None, iterations: [0; 2], saved })
     }
 
     /// Continues from a checkpoint and shows its time.
@@ -72,7 +73,9 @@ impl<'a> Recorder<'a> {
         }
         let record = &run.last().record;
         let from = format!("from step {}, t = {}", record.step, rounded(record.time));
-        say(&screen::row("restart", from));
+        if !self.task.quiet {
+            say(&screen::row("restart", &from));
+        }
         output::remove_outdated(&self.task.folder)
     }
 
@@ -127,7 +130,8 @@ impl<'a> Recorder<'a> {
         }
         let written = stage("output", || {
             let end = self.task.problem.scene().time.map_or(1.0, |grid| grid.end);
-            self.progress.iter_mut().for_each(|of| screen::progress(of, &step.record, end));
+            let shown = self.progress.iter_mut().filter(|_| !self.task.quiet);
+            shown.for_each(|of| screen::progress(of, &step.record, end));
             let row = match comm.is_root() {
                 true => {
                     let added = self.added.iter().map(|&number| step.figures[number].value);
@@ -142,6 +146,8 @@ impl<'a> Recorder<'a> {
                 false => row,
             }
         });
+        self.iterations[0] += step.record.iterations;
+        self.iterations[1] += step.record.linear_iterations;
         self.last = Some(step.clone());
         written
     }
@@ -167,10 +173,9 @@ impl<'a> Recorder<'a> {
             Err(error) => (written.and(Err(error)), Vec::new()),
         };
         let outcome = result.as_ref().ok();
-        let mut notes = notes(task, outcome);
-        notes.extend(last.iter().flat_map(|step| notes_on_extremes(problem, step, &extremes)));
-        let warnings = notes.len();
-        notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(&task.problem)));
+        let mut notes = task.accuracy.notes(problem, outcome);
+        notes.extend(task.notes.iter().cloned().chain(problem.notes()));
+        notes.extend(outcome.iter().flat_map(|outcome| outcome.notes(problem)));
         if result.is_ok() {
             checkpoint::remove(&task.folder, task.problem.body.comm().rank(), None);
         }
@@ -180,19 +185,18 @@ impl<'a> Recorder<'a> {
 
         let record = last.as_ref().map(|step| step.record);
         let figures = last.as_ref().map(|step| LastFigures::new(task, step, &extremes, outcome));
+        notes.extend(figures.iter().flat_map(|figures| figures.notes(problem)));
+        let warnings = notes.len();
+        notes.extend(outcome.iter().flat_map(|outcome| outcome.remarks(problem)));
         let (wall, result) = (task.started.elapsed().as_secs_f64(), result.as_ref());
         if let Some(figures) = &figures {
             let summary = summary(task, record, &figures.all, result, &notes, [wall, memory]);
             let path = task.folder.join("summary.json");
             write_whole(&path, format!("{summary:#}\n").as_bytes())?;
         }
-        let shown = &notes[..warnings];
-        let mut lines = screen::conclusion(task, record, figures.as_ref(), result, shown);
-        let partition = &task.problem.body.nodes.partition;
-        let ranks = paying(2 * partition.total());
-        let is_long = wall > 30.0 && ranks > 1 && partition.comm().is_serial();
-        let idle = if is_long { "; shorter on several cores: --ranks auto" } else { "" };
-        lines.push(screen::row("cost", format!("{wall:.2} s, {memory:.0} MB{idle}")));
+        let shown = if task.verbose { &notes[..] } else { &notes[..warnings] };
+        let cost = ([wall, memory], self.iterations);
+        let lines = screen::conclusion(task, record, figures.as_ref(), result, shown, cost);
         progress.finish();
         say(&lines.join("\n"));
         written
@@ -219,13 +223,4 @@ impl Observer for Recorder<'_> {
         self.saved = Instant::now();
         Ok(())
     }
-}
-
-/// The notes on a run, except remarks. Collective.
-fn notes(task: &Task, outcome: Option<&Outcome>) -> Vec<String> {
-    let Task { problem, accuracy, notes, .. } = task;
-    let of_accuracy = accuracy.notes(problem, outcome).into_iter();
-    let of_task = notes.iter().cloned().chain(problem.notes());
-    let of_run = outcome.into_iter().flat_map(|outcome| outcome.notes(problem));
-    of_accuracy.chain(of_task).chain(of_run).collect()
 }

@@ -14,7 +14,7 @@ use super::{
 };
 use clap::Args;
 use signorini::{
-    accuracy::{AdaptError, LoopState},
+    accuracy::{AdaptError, Adapted, LoopState},
     estimate::Simulation,
     evolution::{Outcome, RunError},
     interrupt::Interrupts,
@@ -56,6 +56,12 @@ pub struct RunArguments {
     /// checkpoint start from the beginning.
     #[arg(long)]
     restart: bool,
+    /// Print one line at the end, and no progress.
+    #[arg(long, short, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Print also residuals, the errors and iterations of the solvers, and remarks.
+    #[arg(long, short)]
+    verbose: bool,
     /// Run on this number of processes, at most one per core, or on as many as pay: starts itself under mpiexec.
     #[arg(long, value_name = "N|auto")]
     ranks: Option<Ranks>,
@@ -180,18 +186,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     result.and(finalized)
 }
 
-/// Notes that this run will remove the checkpoint of the previous one.
-fn warn_of_checkpoint(folder: &Path) {
-    if let [(step, _), ..] = output::checkpoints(folder, 0)[..] {
-        let warning = format!(
-            "{} holds a checkpoint of step {step}, which goes with the other results of that run; \
-             `--restart` would go on from it",
-            folder.display()
-        );
-        tell("warning", &warning);
-    }
-}
-
 /// Reads the scene and, for a restart, the checkpoint on every rank. The first rank reads the mesh for all.
 /// Collective.
 fn read<'a>(
@@ -215,7 +209,8 @@ fn read<'a>(
     let saved = restart.as_mut().map(|checkpoint| mem::take(&mut checkpoint.accuracy));
     let _interrupts = Interrupts::defer();
     let name = if scene.accuracy.is_some() { "adaptation" } else { "error bars" };
-    let start = || accuracy_loop(session, &mut scene, mesh, (arguments.bars, saved));
+    let start =
+        || accuracy_loop(session, &mut scene, mesh, (arguments.bars, saved), arguments.quiet);
     let (accuracy, mesh) = agree(comm, stage(name, start))?;
     let problem = stage("discrete problem", || ObservedProblem::new(scene, mesh));
     let problem = agree(comm, problem.map_err(Failure::input))?;
@@ -224,8 +219,18 @@ fn read<'a>(
     check_factors(session, &problem)?;
     let lock = if comm.is_root() { output::lock(&folder) } else { Ok(None) };
     let lock = agree(comm, lock.map_err(Failure::input))?;
-    if !arguments.restart && comm.is_root() {
-        warn_of_checkpoint(&folder);
+    let left = if arguments.restart || !comm.is_root() {
+        None
+    } else {
+        output::checkpoints(&folder, 0).first().cloned()
+    };
+    if let Some((step, _)) = left {
+        let warning = format!(
+            "the run that left a checkpoint of step {step} in {} is not continued, and its results go; --restart continues \
+             it",
+            folder.display()
+        );
+        tell("warning", &warning);
     }
     let task = Task {
         bound: arguments.bound || arguments.bars || accuracy.adapted.is_some(),
@@ -235,6 +240,8 @@ fn read<'a>(
         folder,
         as_run,
         accuracy,
+        quiet: arguments.quiet,
+        verbose: arguments.verbose,
         notes,
         _lock: lock,
         _interrupts,
@@ -255,9 +262,9 @@ fn solve(
     agree(session.comm(), checked)?;
     let comm = session.comm();
     loop {
-        if task.accuracy.repeats && comm.is_root() {
+        if task.accuracy.repeats && comm.is_root() && !task.quiet {
             let text = "with shorter time steps, which the accuracy needs";
-            say(&screen::row("again", text.to_owned()));
+            say(&screen::row("again", text));
         }
         let started = Instant::now();
         let (recorder, result) = solve_once(&task, restart.take(), session)?;
@@ -282,9 +289,14 @@ pub(super) fn accuracy_loop(
     scene: &mut Scene,
     mesh: Mesh,
     asked: (bool, Option<LoopState>),
+    quiet: bool,
 ) -> Result<(LoopState, Mesh), Failure> {
-    let mut shown = screen::Adaptation::new(session.comm(), scene);
-    let made = LoopState::start(session, scene, mesh, asked, &mut |mesh| shown.add(mesh));
+    let accuracy = scene.accuracy.filter(|_| session.comm().is_root() && !quiet);
+    let mut started = Some(Instant::now());
+    let mut show = |mesh: &Adapted| {
+        accuracy.iter().for_each(|accuracy| screen::adapting(mesh, *accuracy, started.take()));
+    };
+    let made = LoopState::start(session, scene, mesh, asked, &mut show);
     made.map_err(|error| failure(&error))
 }
 

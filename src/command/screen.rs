@@ -1,18 +1,15 @@
 //! The output of a run at the terminal: its task, a progress bar, and the result in a few lines.
 
-use super::{figures::LastFigures, task::Task};
+use super::{figures::LastFigures, ranks::paying, task::Task};
 use signorini::{
     accuracy::Adapted,
-    evolution::{Outcome, RunError, StepRecord, Stop, percent},
-    mesh::extent,
-    observe::{FIRST_CONTACT, in_words},
+    evolution::{Outcome, RunError, StepRecord, percent},
     output::terminal::{Progress, plain, say, with_bar},
-    petsc::Communicator,
     printable::print_error,
     problem::Collapse,
-    scene::{Scene, Scheme, Stepping, TimeGrid, rounded},
+    scene::{Scheme, Stepping, TimeGrid, rounded},
 };
-use std::time::Instant;
+use std::{collections::BTreeSet, time::Instant};
 
 /// The length of the progress bar: it counts parts of [0, T], as many as a run may have steps.
 const LENGTH: u64 = 1_000_000_000;
@@ -30,67 +27,44 @@ pub fn open(task: &Task) -> Progress {
         0 => format!("{solver} (no contact: one linear solve a step)"),
         _ => solver.to_owned(),
     };
-    let mut lines = vec![scene.title.clone(), row("mesh", mesh), row("solver", solver)];
+    let mut lines = vec![scene.title.clone(), row("mesh", &mesh), row("solver", &solver)];
     let steps = |grid| steps(grid, &scene.units.time, task.problem.damage().is_some());
-    lines.extend(scene.time.map(|grid| row("time", steps(grid))));
-    lines.extend(task.problem.large_load().map(|note| row("note", note)));
-    say(&lines.join("\n"));
-
+    lines.extend(scene.time.map(|grid| row("time", &steps(grid))));
+    let note = task.problem.large_load().filter(|_| !task.accuracy.repeats);
+    lines.extend(note.map(|note| row("note", &note)));
     let mut progress = Progress::new(LENGTH);
-    progress.show(0, vec!["the first solve".to_owned()]);
+    if !task.quiet {
+        say(&lines.join("\n"));
+        progress.show(0, vec!["the first solve".to_owned()]);
+    }
     progress
 }
 
-/// Shows the meshes of the accuracy loop.
-pub struct Adaptation {
-    accuracy: Option<f64>,
-    started: Option<Instant>,
-}
-
-impl Adaptation {
-    /// Only the first rank shows them.
-    pub fn new(comm: Communicator, scene: &Scene) -> Self {
-        let accuracy = scene.accuracy.filter(|_| comm.is_root());
-        Self { accuracy, started: Some(Instant::now()) }
-    }
-
-    /// Shows a mesh with its errors, and after the first one what the following ones may need.
-    pub fn add(&mut self, mesh: &Adapted) {
-        let Some(accuracy) = self.accuracy else { return };
-        adapting(mesh, accuracy);
-        if let Some(started) = self.started.take() {
-            expected(mesh, accuracy, started.elapsed().as_secs_f64());
-        }
-    }
-}
-
-/// Shows a mesh of the adaptation with its errors.
-fn adapting(mesh: &Adapted, accuracy: f64) {
+/// Shows a mesh of the accuracy loop with its errors, and after the first one, which `started` then, what the rounds to come may
+/// need. The error of quadratic elements on adapted meshes falls like 1/unknowns. The rounds to come take about fifteen times as
+/// long as the run on the last mesh, and 11 kB for each of its unknowns.
+pub fn adapting(mesh: &Adapted, accuracy: f64, started: Option<Instant>) {
     let (rounds, triangles, unknowns) = (mesh.rounds, mesh.mesh.triangles.len(), mesh.unknowns);
     // The norms come first, and are not repeated.
     let worst = mesh.worst.iter().filter(|(name, _)| name != "damage" && name != "displacement");
-    let errors = [("error of u", Some(mesh.error)), ("damage", mesh.damage_error)]
+    let errors = [("u", Some(mesh.error)), ("damage", mesh.damage_error)]
         .into_iter()
         .chain(worst.map(|(name, error)| (&**name, Some(*error))))
         .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))));
-    let text = format!(
-        "mesh {rounds}: {triangles} triangles, {unknowns} unknowns, {} (accuracy {})",
-        errors.collect::<Vec<_>>().join(", "),
-        percent(accuracy)
-    );
-    print_error(&row("adapting", text));
-}
-
-/// Shows what the rounds to come may need, after the first one has taken `seconds`. The error of quadratic elements on
-/// adapted meshes falls like 1/unknowns. The rounds to come take about fifteen times as long as the run on the last
-/// mesh, and 11 kB for each of its unknowns.
-fn expected(mesh: &Adapted, accuracy: f64, seconds: f64) {
-    let growth = (mesh.error.max(mesh.damage_error.unwrap_or(0.0)) / accuracy).max(1.0);
-    let unknowns = growth * mesh.unknowns as f64;
-    let (seconds, megabytes) = (15.0 * growth * seconds, 50.0 + 0.011 * unknowns);
-    let [unknowns, seconds] = [unknowns, seconds].map(|number| plain(number, 1));
-    let text = format!("roughly {unknowns} unknowns, {seconds} s, {megabytes:.0} MB");
-    print_error(&row("expected", text));
+    let errors = Vec::from_iter(errors).join(", ");
+    let text =
+        format!("mesh {rounds}: {triangles} triangles, {unknowns} unknowns, errors: {errors}");
+    print_error(&row("adapting", &text));
+    if let Some(started) = started {
+        let growth = (mesh.error.max(mesh.damage_error.unwrap_or(0.0)) / accuracy).max(1.0);
+        let unknowns = growth * mesh.unknowns as f64;
+        let seconds = 15.0 * growth * started.elapsed().as_secs_f64();
+        let [count, seconds] = [unknowns, seconds].map(|number| plain(number, 1));
+        let megabytes = 50.0 + 0.011 * unknowns;
+        let text =
+            format!("roughly {count} unknowns, {seconds} s, {megabytes:.0} MB for the accuracy");
+        print_error(&row("expected", &text));
+    }
 }
 
 /// Shows an accepted step of a run to t = `end`.
@@ -105,180 +79,95 @@ pub fn progress(bar: &mut Progress, record: &StepRecord, end: f64) {
     bar.show((LENGTH as f64 * record.time / end) as u64, fields);
 }
 
-/// The closing lines of a run: its end, and the figures of its last accepted state. `last` is `None` if the first solve failed.
+/// The closing lines of a run: how it ended, the figures of its last accepted state, their errors, notes, and the next step.
+/// `last` is `None` if the first solve failed. The run took `wall` seconds, `memory` MB on all ranks, and these iterations of the
+/// contact solver, and of the linear solvers in it.
 pub fn conclusion(
     task: &Task,
     last: Option<StepRecord>,
     figures: Option<&LastFigures>,
     result: Result<&Outcome, &RunError>,
     notes: &[String],
+    ([wall, memory], [iterations, linear]): ([f64; 2], [usize; 2]),
 ) -> Vec<String> {
-    let notes = notes.iter().map(|note| row("note", note.clone()));
-    let end = row("end", ending(task.problem.collapse, last, result));
-    let outcome = result.ok();
-    let (Some(last), Some(figures)) = (last, figures) else {
-        return [end].into_iter().chain(notes).collect();
-    };
-    let mut lines = vec![end, row("damage", damage(task, last.step, figures, outcome))];
-    lines.push(row("displacement", displacement(task, figures)));
-    lines.push(row("work", figures.full_text("work")));
-    lines.extend(stresses(task, figures));
-    lines.extend(contact(task, last, figures));
-    lines.extend(task.problem.supports.names.iter().map(|name| support(name, figures)));
-    lines.extend(task.problem.scene().probes.iter().map(|of| probe(task, &of.name, figures)));
-    let governing = figures.governing().enumerate().map(|(i, (label, value, time))| {
-        let name = if i == 0 { "in the run" } else { "" };
-        row(name, format!("{label} {value} (t = {})", rounded(time)))
-    });
-    lines.extend(governing);
-    if let Some(outcome) = outcome {
-        let names = ["errors", "", "", ""].into_iter();
-        let errors = names.zip(outcome.errors.lines(outcome.stopped.as_ref()));
-        lines.extend(errors.map(|(name, line)| row(name, line)));
+    let (outcome, problem, folder) = (result.ok(), &task.problem, task.folder.display());
+    let end = ending(problem.collapse, problem.threshold(), last, result);
+    let of_accuracy = task.accuracy.conclusion(problem, outcome).map_or_else(Vec::new, |of| of.1);
+    if task.quiet {
+        let answers = end.iter().take(1).chain(of_accuracy.iter().take(1)).cloned();
+        let warned = (!notes.is_empty()).then(|| format!("notes: {}", notes.len()));
+        let all = Vec::from_iter(answers.chain(warned).chain([format!("results in {folder}")]));
+        return vec![format!("{}: {}", problem.scene().name, all.join(", "))];
     }
-    lines.push(row("residuals", outcome.map_or(last.kkt(), |outcome| outcome.kkt).to_string()));
-    lines.extend(notes);
-    lines.push(row("results", task.folder.display().to_string()));
-    lines
-}
-
-/// The damage of the last state.
-fn damage(task: &Task, step: usize, figures: &LastFigures, outcome: Option<&Outcome>) -> String {
-    let state = match (figures.value("zeta_min"), step) {
-        (1.0, 1) if task.problem.damage().is_some() => "none yet: shorten time.step".to_owned(),
-        (1.0, _) => "none".to_owned(),
-        _ => format!("min ζ {}, mean ζ {}", figures.text("zeta_min"), figures.text("zeta_mean")),
-    };
-    match outcome.and_then(|outcome| outcome.stopped) {
-        Some(_) => format!("min ζ reached ζ_* = {}; before: {state}", task.problem.threshold()),
-        None => state,
+    // This note was shown at the start.
+    let large_load = problem.large_load();
+    let notes = notes.iter().filter(|note| Some(*note) != large_load.as_ref());
+    let end = end.into_iter().chain(of_accuracy);
+    let mut facts = Vec::from_iter(end.map(|fact| ("end", fact)));
+    let errors = outcome.map(|outcome| outcome.errors.lines(outcome.stopped.as_ref()));
+    let (errors, next) = errors.unwrap_or_default();
+    if let (Some(last), Some(figures)) = (last, figures) {
+        facts.extend(figures.facts(task, last.step));
+        facts.extend(figures.governing().map(|fact| ("in the run", fact)));
+        facts.extend(errors.into_iter().map(|fact| ("errors", fact)));
+        if task.verbose {
+            let kkt = outcome.map_or(last.kkt(), |outcome| outcome.kkt).to_string();
+            facts.extend(kkt.split(", ").map(|fact| ("residuals", fact.to_owned())));
+            facts.extend(outcome.map(|of| {
+                ("solver", format!("relative error of u about {:.0e}", of.errors.solver))
+            }));
+            facts.push((
+                "solver",
+                format!("{iterations} iterations, {linear} of the linear solvers"),
+            ));
+            let active =
+                format!("{} of {} nodes in contact", last.active_nodes, task.contact_nodes);
+            facts.push(("solver", active));
+        }
     }
-}
-
-/// The largest displacement, and whether it is larger than the body.
-fn displacement(task: &Task, figures: &LastFigures) -> String {
-    let largest = format!("largest {}", figures.full_text("displacement_max"));
-    match figures.value("displacement_max") / extent(&task.problem.mesh().nodes) {
-        times @ 1.0.. => format!(
-            "{largest}, {times:.1} times the body: NOT an answer for a real body, as strains must be small; check the units \
-             of E and the loads"
-        ),
-        _ => largest,
+    facts.extend(notes.clone().map(|note| ("note", note.clone())));
+    facts.extend(last.map(|_| ("results", folder.to_string())));
+    facts.push(("cost", format!("{wall:.2} s, {memory:.0} MB")));
+    let partition = &problem.body.nodes.partition;
+    if wall > 30.0 && partition.comm().is_serial() && paying(2 * partition.total()) > 1 {
+        facts.push(("cost", "--ranks auto is faster: it uses several cores".to_owned()));
     }
-}
-
-/// The region of the figures `…_away`.
-const AWAY: &str = "away from singular points";
-
-/// The lines of the extreme stresses of the body, and a line for each of several materials.
-fn stresses(task: &Task, figures: &LastFigures) -> Vec<String> {
-    if figures.value("von_mises_max") == 0.0 {
-        return Vec::new();
+    // The topics that notes end with.
+    let topic =
+        |note: &String| Some(note.rsplit_once(" (explain ")?.1.trim_end_matches(')').to_owned());
+    let topics = Vec::from_iter(BTreeSet::from_iter(notes.filter_map(topic)));
+    if !topics.is_empty() {
+        facts.push(("more", format!("signorini explain {}", topics.join(" "))));
     }
-    let [von_mises, most, least] =
-        ["von_mises_max", "principal_max", "principal_min"].map(|name| figures.full_text(name));
-    let grows = match figures.singular("von_mises_max") {
-        Some(place) => format!(" at {place}, grows as the mesh is refined"),
-        None => String::new(),
+    facts.extend(next.filter(|_| task.accuracy.adapted.is_none()).map(|next| ("next", next)));
+    // The name of a group stands before its first fact; notes are apart.
+    let name = |i: usize| {
+        if i > 0 && facts[i - 1].0 == facts[i].0 && facts[i].0 != "note" { "" } else { facts[i].0 }
     };
-    // A line of all extremes of a part, or of the body; `away` from singular points, if there are such figures.
-    let line = |part: &str, words: &str, away: &str| {
-        let kinds = ["von_mises_max", "principal_max", "principal_min"];
-        let names = kinds.map(|kind| format!("{part}{kind}{away}"));
-        figures.get(&names[0])?;
-        let [von_mises, most, least] = names.map(|name| figures.full_text(&name));
-        Some(row("", format!("{words}: von Mises {von_mises}, σ₁ {most}, σ₂ {least}")))
-    };
-    let of_material = |name: &str| {
-        let (part, words) = (format!("{name}."), in_words(name));
-        let of_rest = format!("{words}, {AWAY}");
-        [line(&part, words, ""), line(&part, &of_rest, "_away")].into_iter().flatten()
-    };
-    let materials = task.problem.materials();
-    let several = materials.clone().count() > 1;
-    let away = line("", AWAY, "_away").or_else(|| {
-        let length = task.problem.proposed_distance().filter(|_| !grows.is_empty())?;
-        let (length, unit) = (plain(length, 1), &task.problem.scene().units.length);
-        let what =
-            format!("`away = {length}` adds the extremes at least {length} {unit} away from");
-        Some(row("", format!("{what} singular points")))
-    });
-    [
-        row("stress", format!("largest von Mises {von_mises}{grows}")),
-        row("", format!("largest σ₁ {most}")),
-        row("", format!("smallest σ₂ {least}")),
-    ]
-    .into_iter()
-    .chain(away)
-    .chain(materials.filter(|_| several).flat_map(of_material))
-    .collect()
+    facts.iter().enumerate().map(|(i, (_, fact))| row(name(i), fact)).collect()
 }
 
-/// The lines of contact: of the whole contact and, if there are several foundations, of each.
-fn contact(task: &Task, last: StepRecord, figures: &LastFigures) -> Vec<String> {
-    let foundations = &task.problem.foundations[..];
-    if foundations.is_empty() {
-        return Vec::new();
+/// The number of columns of a line, and the column at which a long fact goes on in further lines.
+const COLUMNS: usize = 80;
+const FURTHER: usize = 18;
+
+/// The lines of a fact.
+pub fn row(name: &str, fact: &str) -> String {
+    // A number and its percent sign stay together.
+    let fact = fact.replace(" %", "\u{a0}%");
+    let mut words = fact.split(' ');
+    let mut text = format!("  {name:<13} {}", words.next().unwrap_or_default());
+    let mut columns = text.chars().count();
+    for word in words {
+        columns += 1 + word.chars().count();
+        if columns > COLUMNS {
+            text += &format!("\n{:FURTHER$}{word}", "");
+            columns = FURTHER + word.chars().count();
+        } else {
+            text += &format!(" {word}");
+        }
     }
-    let (active, nodes) = (last.active_nodes, task.contact_nodes);
-    let force = figures.full_text("contact_force");
-    let several = if foundations.len() > 1 { foundations } else { &[] };
-    let of = |foundation: Option<&String>| {
-        let [prefix, name] = match foundation {
-            Some(name) => [format!("{name}."), format!("{name}: ")],
-            None => [String::new(), String::new()],
-        };
-        let [length, pressure] =
-            ["contact_length", "pressure_max"].map(|of| format!("{prefix}{of}"));
-        let largest = match figures.value(&pressure) {
-            0.0 => String::new(),
-            _ => format!(", largest pressure {}", figures.full_text(&pressure)),
-        };
-        row("", format!("{name}length {}{largest}", figures.full_text(&length)))
-    };
-    let all = [None].into_iter().chain(several.iter().map(Some)).map(of);
-    let first_contact = |name: &String| {
-        let [time, x, y] = FIRST_CONTACT.map(|kind| format!("{name}.{kind}"));
-        figures.value(&time).is_finite().then(|| {
-            let [time, x, y] = [figures.full_text(&time), figures.text(&x), figures.full_text(&y)];
-            row("", format!("{name}: first contact at t = {time}, under loads of ({x}, {y})"))
-        })
-    };
-    let first = row("contact", format!("{active} of {nodes} nodes active, force {force}"));
-    let first_contacts = foundations.iter().filter_map(first_contact);
-    [first].into_iter().filter(|_| nodes > 0).chain(all).chain(first_contacts).collect()
-}
-
-/// The line of a support with its resultants.
-fn support(name: &str, figures: &LastFigures) -> String {
-    let [x, y] = ["force_x", "force_y"].map(|of| figures.text(&format!("{name}.{of}")));
-    let unit = figures.get(&format!("{name}.force_x")).map_or("", |of| &*of.unit);
-    let places = ["contact_start", "contact_end", "acts_at"]
-        .map(|of| figures.place(&format!("{name}.{of}")));
-    let contact = match places {
-        [Some(start), Some(end), Some(at)] => format!(" at {at}, contact from {start} to {end}"),
-        _ => String::new(),
-    };
-    let moment = figures.full_text(&format!("{name}.moment"));
-    row("support", format!("{name}: force ({x}, {y}) {unit}{contact}, moment {moment}"))
-}
-
-/// The line of a probe with its displacement, stresses and damage.
-fn probe(task: &Task, name: &str, figures: &LastFigures) -> String {
-    let [x, y, zeta] = ["u_x", "u_y", "zeta"].map(|of| figures.text(&format!("{name}.{of}")));
-    let unit = &task.problem.scene().units.length;
-    let von_mises = figures.full_text(&format!("{name}.von_mises"));
-    let zeta = match task.problem.scene().damage {
-        Some(_) => format!(", ζ {zeta}"),
-        None => String::new(),
-    };
-    let [xx, yy, xy] = ["xx", "yy", "xy"].map(|of| figures.text(&format!("{name}.stress_{of}")));
-    let stress = format!("σ_xx {xx}, σ_yy {yy}, σ_xy {xy}, von Mises {von_mises}");
-    row("probe", format!("{name}: u ({x}, {y}) {unit}, {stress}{zeta}"))
-}
-
-pub fn row(name: &str, value: String) -> String {
-    format!("  {name:<13} {value}")
+    text.replace('\u{a0}', " ")
 }
 
 fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
@@ -298,43 +187,46 @@ fn steps(grid: TimeGrid, unit: &str, can_be_damaged: bool) -> String {
     }
 }
 
-/// The time of ζ_* with its error bar.
-fn stop_time(stop: &Stop) -> String {
-    let bar = with_bar(stop.time, Some(stop.bar()));
-    match stop.from_mesh {
-        _ if stop.bar() >= stop.time || stop.bar().is_nan() => format!(
-            "{} (error unknown: ζ hardly falls there, or steps or triangles are too large)",
-            rounded(stop.time)
-        ),
-        Some(_) => bar,
-        None => format!("{bar} (the time steps alone)"),
-    }
-}
-
+/// How the run ended, and what follows from it for its results.
 fn ending(
     collapse: Option<Collapse>,
+    threshold: f64,
     last: Option<StepRecord>,
     result: Result<&Outcome, &RunError>,
-) -> String {
+) -> Vec<String> {
     let Some(StepRecord { step, time, .. }) = last else {
-        return "FAILED at the first solve; there is no state to save".to_owned();
+        return vec!["FAILED at the first solve; there is no state to save".to_owned()];
     };
     let end = rounded(time);
+    let before = format!("the results show the state before: step {step}, t = {end}");
     match (result.map(|outcome| outcome.stopped), collapse) {
-        (Err(RunError::Interrupted(_)), _) => {
-            format!("interrupted after t = {end}; the state there is saved, --restart goes on")
+        (Err(error), _) => {
+            let how =
+                if matches!(error, RunError::Interrupted(_)) { "interrupted" } else { "FAILED" };
+            vec![format!("{how} after t = {end}; the state there is saved")]
         }
-        (Err(_), _) => format!("FAILED after t = {end}; the state there is saved"),
-        (Ok(Some(stop)), _) => format!(
-            "STOPPED at t = {}: min ζ reaches ζ_* there; saved is the state before, t = {end} (step {step})",
-            stop_time(&stop),
-        ),
-        (Ok(None), Some(Collapse { time, motion })) => format!(
-            "STOPPED at t = {}: nothing supports the body against {motion} any more; saved is the state just before \
-             (step {step})",
-            rounded(time)
-        ),
-        (Ok(None), None) if step == 0 => format!("solved at t = {end}"),
-        (Ok(None), None) => format!("finished at t = {end} after {step} steps"),
+        (Ok(Some(stop)), _) => {
+            let is_known = stop.bar() < stop.time;
+            let time = if is_known {
+                with_bar(stop.time, Some(stop.bar()))
+            } else {
+                rounded(stop.time).to_string()
+            };
+            let reached = format!("STOPPED at t = {time}: the least ζ reaches ζ_* = {threshold}");
+            let error = match (is_known, stop.from_mesh) {
+                (false, _) => {
+                    "the error of this time is unknown: shorten the steps or refine the mesh"
+                }
+                (true, Some(_)) => return vec![reached, before],
+                (true, None) => "± is the error of the time steps alone; --bars adds the mesh",
+            };
+            vec![reached, error.to_owned(), before]
+        }
+        (Ok(None), Some(Collapse { time, motion })) => vec![
+            format!("STOPPED at t = {}: nothing supports the body against {motion}", rounded(time)),
+            format!("the results show the state just before, step {step}"),
+        ],
+        (Ok(None), None) if step == 0 => vec![format!("solved at t = {end}")],
+        (Ok(None), None) => vec![format!("finished at t = {end} after {step} steps")],
     }
 }

@@ -48,9 +48,11 @@ pub(super) fn summary(
         // The named curves of the mesh as segments [[x, y], [x, y]], m, the body on their left.
         "boundaries": problem.boundaries(),
         "units": scene.units,
-        "notes": notes,
     });
-    if let Some((reached, _)) = task.accuracy.conclusion(problem, outcome) {
+    let conclusion = task.accuracy.conclusion(problem, outcome);
+    let of_accuracy = conclusion.iter().map(|(_, lines)| lines.join("; "));
+    summary["notes"] = json!(Vec::from_iter(of_accuracy.chain(notes.iter().cloned())));
+    if let Some((reached, _)) = conclusion {
         summary["reached"] = json!(reached);
     }
     if let Err(error) = result {

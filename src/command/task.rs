@@ -20,6 +20,9 @@ pub struct Task<'a> {
     pub accuracy: LoopState,
     /// Is a proved bound on the error of u asked for?
     pub bound: bool,
+    /// Does the user want one line, or what an expert wants?
+    pub quiet: bool,
+    pub verbose: bool,
     /// Notes on the arguments.
     pub notes: Vec<String>,
     /// The lock of the folder against other runs.

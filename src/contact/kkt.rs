@@ -70,10 +70,11 @@ impl Kkt {
     pub fn missed(&self, tolerance: f64) -> String {
         let missed =
             self.named().into_iter().filter(|(_, value)| value.is_nan() || *value > tolerance);
-        let text =
-            |(name, value)| format!("{name} {value:.1e} ({:.1e} times it)", value / tolerance);
+        let text = |(name, value)| {
+            format!("{name} {value:.1e}, {:.1e} times too large", value / tolerance)
+        };
         let missed: Vec<String> = missed.map(text).collect();
-        format!("the tolerance {tolerance:.1e} is missed by {}", missed.join(", "))
+        format!("the tolerance {tolerance:.1e} is missed by {}", missed.join("; "))
     }
 
     /// The larger of each residual of two answers; NaN if one is.

@@ -117,12 +117,8 @@ impl RunError {
         time: f64,
         (source, attainable): (ContactError, Option<f64>),
     ) -> Self {
-        let others = match (problem.has_contact(), step > 0) {
-            (true, true) => "another contact.solver, shorter steps or ",
-            (true, false) => "another contact.solver or ",
-            (false, true) => "shorter steps or ",
-            (false, false) => "",
-        };
+        let solver = if problem.has_contact() { ", another contact.solver" } else { "" };
+        let steps = if step > 0 { ", shorter time steps" } else { "" };
         let reached = "; double precision reaches only about";
         let advice = match (attainable, problem.contrast()) {
             (Some(attainable), Some(contrast)) => format!(
@@ -133,7 +129,9 @@ impl RunError {
                 "{reached} {attainable:.0e} here (triangles or parts much longer than wide, nearly incompressible or almost \
                  broken material): set contact.tolerance to that or more, or mend the mesh"
             ),
-            (None, _) if source.is_missed() => format!("; try {others}a larger contact.tolerance"),
+            (None, _) if source.is_missed() => {
+                format!("; try a larger contact.tolerance{solver}{steps}")
+            }
             (None, _) => String::new(),
         };
         let time = problem.scene().time.map(|_| time);

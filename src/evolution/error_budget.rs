@@ -36,7 +36,7 @@ pub struct ErrorBudget {
 }
 
 /// If all errors are below this, there is no advice.
-const NEGLIGIBLE_ERROR: f64 = 1e-9;
+const NEGLIGIBLE_ERROR: f64 = 1e-3;
 
 impl ErrorBudget {
     /// Sets the error of u from the mesh to the `measured` one, but at least to its estimate, and at most to a proved bound.
@@ -47,87 +47,65 @@ impl ErrorBudget {
         self.is_measured = measured > 0.0;
     }
 
-    /// The error of u from the mesh: the proved bound, beside it the measured error, or the estimate from recovered strains.
-    fn of_displacements(&self) -> String {
-        let (estimate, reservations) =
-            (percent(self.displacement_mesh), self.reservations.join(", "));
+    /// A bound on the error of u from the mesh. Beside a measured error, only a useful proof says more.
+    fn bound(&self) -> Option<String> {
+        let (left_out, is_measured) = (self.reservations.join(", "), self.is_measured);
         let proved = if self.can_be_damaged { "proved for this ζ" } else { "proved" };
-        let found = if self.is_measured { "measured" } else { "estimated" };
-        let error = match (self.displacement_bound, &reservations[..]) {
-            (Some(bound @ 1.0..), "") => format!(
-                "at most {} (energy norm, {proved}): useless, the mesh is too coarse, its triangles are too \
-                 stretched, or contact is in single nodes",
-                percent(bound)
+        let text = match (
+            self.displacement_bound.map(|bound| (bound, percent(bound))),
+            &left_out[..],
+        ) {
+            (Some((..1.0, bound)), "") => format!("at most {bound} ({proved}, energy norm)"),
+            (None, "") => return None,
+            _ if is_measured => return None,
+            (Some((_, bound)), "") => format!(
+                "no useful bound ({bound}): the mesh is too coarse, its triangles are too stretched, or contact is in single \
+                 nodes"
             ),
-            (Some(bound), "") => format!("at most {} (energy norm, {proved})", percent(bound)),
-            (Some(bound), left_out) => format!(
-                "about {} (energy norm, a bound without proof, as {left_out})",
-                percent(bound)
-            ),
-            (None, "") => format!("{estimate} (energy norm, {found})"),
-            (None, reason) => format!("{estimate} (energy norm, {found}: no proof, as {reason})"),
+            (Some((_, bound)), _) => format!("{bound} by a bound without proof: {left_out}"),
+            (None, _) => format!("no bound: {left_out}"),
         };
-        // Beside a measured error, only a useful proof says more.
-        let is_proof =
-            self.displacement_bound.is_some_and(|of| of < 1.0) && reservations.is_empty();
-        match (self.is_measured, is_proof) {
-            (true, true) => format!("from the mesh: u {estimate} (measured), {error}"),
-            (true, false) => format!("from the mesh: u {estimate} (energy norm, measured)"),
-            _ => format!("from the mesh: u {error}"),
-        }
+        Some(format!("from the mesh: u {text}"))
     }
 
-    /// The errors by their causes, and advice on which cause to reduce. For a run that stopped at ζ_*, the error of
+    /// The errors by their causes, and the next step: which cause to reduce. For a run that stopped at ζ_*, the error of
     /// that time replaces the error of the damage.
-    pub fn lines(&self, stopped: Option<&Stop>) -> [String; 4] {
-        let of_damage = |error: Option<f64>, missing: &str| match error {
-            Some(error) => format!("damage {}", percent(error)),
-            None => missing.to_owned(),
+    pub fn lines(&self, stopped: Option<&Stop>) -> (Vec<String>, Option<String>) {
+        const OF_MESH: &str = "from the mesh";
+        const OF_STEPS: &str = "from the time steps";
+        let found = if self.is_measured { "measured" } else { "estimated" };
+        let error = self.displacement_mesh;
+        let of_u = format!("{OF_MESH}: u {} ({found}, energy norm)", percent(error));
+        let mut errors = match stopped {
+            Some(stop) => [(OF_MESH, stop.from_mesh), (OF_STEPS, Some(stop.uncertainty))]
+                .map(|(cause, off)| (cause, "time of ζ_*", off.map(|off| off / stop.time)))
+                .to_vec(),
+            None if self.can_be_damaged => vec![
+                (OF_MESH, "damage", self.damage_mesh),
+                (OF_STEPS, "u", self.displacement_steps),
+                (OF_STEPS, "damage", self.damage_steps),
+            ],
+            None => Vec::new(),
         };
-        let missing =
-            if self.can_be_damaged { "damage not measured (see --bars)" } else { "no damage" };
-        let damage_mesh = of_damage(self.damage_mesh, missing);
-        let of_stop = |off: Option<f64>| match off {
-            Some(off) if off.is_nan() => "the time of ζ_* not estimated".to_owned(),
-            Some(off) => format!("the time of ζ_* off by up to {off:.1e}"),
-            None => "the time of ζ_* not measured (see --bars)".to_owned(),
+        let line = |(cause, of, error): &(&str, &str, Option<f64>)| match error {
+            Some(error) if !error.is_nan() => format!("{cause}: {of} {}", percent(*error)),
+            _ if *cause == OF_MESH => format!("{cause}: {of} not measured; --bars measures it"),
+            _ => format!("{cause}: {of} not estimated"),
         };
-        let of_u = self.displacement_steps;
-        let (of_mesh, of_steps, mesh, steps) = match (stopped, of_u) {
-            (Some(stop), _) => {
-                let [mesh, steps] = [stop.from_mesh, Some(stop.uncertainty)];
-                let part = |off: Option<f64>| off.map(|off| off / stop.time);
-                (of_stop(mesh), of_stop(steps), part(mesh), part(steps))
-            }
-            (None, Some(u)) => {
-                let steps =
-                    format!("u {}, {}", percent(u), of_damage(self.damage_steps, "no damage"));
-                let largest = self.damage_steps.map_or(u, |damage| damage.max(u));
-                (damage_mesh, steps, self.damage_mesh, Some(largest))
-            }
-            (None, None) => {
-                let steps = if self.can_be_damaged { "not estimated" } else { "none" };
-                (damage_mesh, steps.to_owned(), self.damage_mesh, None)
-            }
-        };
-        let of_u = if stopped.is_some() { 0.0 } else { self.displacement_mesh };
-        let (mesh, steps_most) = (of_u.max(mesh.unwrap_or(0.0)), steps.unwrap_or(0.0));
-        let (of_solver, solver) = match self.solver.is_finite() {
-            true => (format!("{:.0e}", self.solver), self.solver),
-            false => ("not estimated".to_owned(), 0.0),
-        };
-        let advice = match mesh.max(steps_most) {
-            largest if largest.max(solver) < NEGLIGIBLE_ERROR => "",
-            largest if solver > largest => "; to improve: the solver's tolerance",
-            _ if steps_most > mesh => "; to improve: shorter time steps",
-            _ => "; to improve: the mesh",
-        };
-        [
-            self.of_displacements(),
-            format!("from the mesh: {of_mesh}"),
-            format!("from the time steps: {of_steps}"),
-            format!("from the solver: u {of_solver}{advice}"),
-        ]
+        let lines = [of_u].into_iter().chain(self.bound()).chain(errors.iter().map(line)).collect();
+        errors.push((OF_MESH, "u", Some(error).filter(|_| stopped.is_none())));
+        errors.push(("from the solver", "u", Some(self.solver).filter(|error| error.is_finite())));
+        let known = errors.into_iter().filter_map(|(cause, of, error)| Some((cause, of, error?)));
+        let worst = known.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|of| of.2 > NEGLIGIBLE_ERROR);
+        let next = worst.map(|(cause, of, error)| {
+            let advice = match cause {
+                OF_MESH => "a finer mesh",
+                OF_STEPS => "shorter time steps",
+                _ => "a smaller contact.tolerance",
+            };
+            format!("{advice} (the largest error: {of} {})", percent(error))
+        });
+        (lines, next)
     }
 }
 

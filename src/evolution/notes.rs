@@ -32,13 +32,14 @@ impl Outcome {
         let of_residuals = [
             early.map(|least| {
                 format!(
-                    "ζ_* was reached too early or wrongly: the sources allow no ζ below {least:.4}"
+                    "the run stopped too early: the damage law allows no ζ below {least:.4} up to this time; set damage.mass = \
+                     \"lumped\" (explain stop)"
                 )
             }),
             self.may_stop.map(|time| {
                 format!(
-                    "the time steps are too long: within their error, ζ_* may have been reached at t = {}, and the error of \
-                     the figures is unknown; set a smaller time.step or time.tolerance",
+                    "the time steps are too long to exclude that ζ reached ζ_* at t = {}, so that the errors of the figures \
+                     are unknown; set a smaller time.step or time.tolerance (explain stop)",
                     rounded(time)
                 )
             }),
@@ -46,17 +47,17 @@ impl Outcome {
                 .note(problem.mass(), slowest_diffusion(&problem.body, &problem.diffusions())),
             self.unconstrained.as_ref().map(|(steps, times, motion)| {
                 let [first, last] = times.map(rounded);
-                let when = match steps {
-                    1 => format!("at t = {first}"),
-                    steps => format!("in {steps} steps, at t = {first} first and t = {last} last"),
-                };
                 // Nodes that touch without force may still block the motion.
-                let problem = "no active contact node supports the body against";
-                format!("{when}, {problem} {motion}: the answer may be one of many")
+                format!(
+                    "no contact force acts against {motion} in {} (t = {first} to {last}): the answer may be one of many; \
+                     support this motion (explain collapse)",
+                    counted(*steps)
+                )
             }),
             (worst > problem.tolerance).then(|| {
                 format!(
-                    "KKT residuals up to {worst:.1e} are all that double precision allows ({cause})"
+                    "the KKT residuals are up to {worst:.1e}, above contact.tolerance: rounding allows no less here \
+                     ({cause}) (explain solvers)"
                 )
             }),
             self.penetration.clone(),
@@ -68,25 +69,32 @@ impl Outcome {
         let of_model = [
             // A stop in the first step has no state that moves.
             (most == 0.0 && has_gaps && self.stopped.is_none()).then(|| {
-                "nothing moves: no load acts and no foundation presses; check their signs".to_owned()
+                "nothing moves: no load acts and no foundation presses; check their signs \
+                 (explain large-rotation)"
+                    .to_owned()
             }),
             (0.0 < most && most < HARDLY * size).then(|| {
                 let part = most / size;
                 format!(
                     "the largest displacement is only {part:.0e} of the body's size: is E in the unit of the stresses \
-                     (N/mm² with mm and N)?"
+                     (N/mm² with mm and N)? (explain large-rotation)"
                 )
             }),
             (moved > size).then(|| {
                 let times = moved / size;
-                format!("the largest displacement is {times:.1} times the body; check units, gaps and loads")
+                format!(
+                    "the largest displacement is {times:.1} times the body, NOT an answer for a real one; check units, \
+                     gaps and loads (explain large-rotation)"
+                )
             }),
             large_gradients(&problem.body, &self.last.state.u),
             self.rescued.as_ref().map(|(steps, solver)| {
                 let steps = counted(*steps);
-                format!("in {steps} the solver missed the tolerance and {solver} gave the answer")
+                format!(
+                    "in {steps} the contact solver missed its tolerance, and {solver} gave the answer (explain solvers)"
+                )
             }),
-            self.adaptive_steps_note(problem, true),
+            self.missed_tolerance(problem),
         ];
         // Wrong units cause the other problems, too.
         let notes = of_model.into_iter().chain(of_residuals).flatten();
@@ -98,34 +106,28 @@ impl Outcome {
         let (skipped, steps) = (self.skipped_damage_solves, self.last.record.step);
         let remarks = [
             (skipped > 0 && problem.damage().is_some()).then(|| {
-                format!("the damage solve was skipped in {skipped} of {steps} steps: no source, uniform ζ")
+                format!("ζ was not solved for in {skipped} of {steps} steps: it was uniform and did not change there")
             }),
             (self.rejected > 0)
-                .then(|| format!("{} steps were rejected and tried again, shorter", self.rejected)),
-            self.adaptive_steps_note(problem, false),
+                .then(|| format!("{} steps were rejected and repeated, shorter", self.rejected)),
         ];
         remarks.into_iter().flatten().collect()
     }
 
-    /// A note on the adaptive steps, if their time error `misses` the tolerance or if it does not. At a stop the damage
-    /// grows without bound, and the error of the time of ζ_* counts alone.
-    fn adaptive_steps_note(&self, problem: &DiscreteProblem, misses: bool) -> Option<String> {
+    /// A note on adaptive steps whose error is above the tolerance. At a stop the damage grows without bound, and the error of the
+    /// time of ζ_* counts alone. If an accuracy is required, the program has set the tolerance itself.
+    fn missed_tolerance(&self, problem: &DiscreteProblem) -> Option<String> {
+        let scene = problem.scene();
+        let Stepping::Auto { tolerance, .. } = scene.time?.stepping else { return None };
+        let counts =
+            problem.damage().is_some() && self.stopped.is_none() && scene.accuracy.is_none();
         let error =
-            self.damage_error.filter(|_| problem.damage().is_some() && self.stopped.is_none())?;
-        let Stepping::Auto { tolerance, .. } = problem.scene().time?.stepping else { return None };
-        // If an accuracy is required, the program has set the tolerance itself.
-        let missed = (error > tolerance || error.is_nan()) && problem.scene().accuracy.is_none();
-        let advice = match missed {
-            true => format!(", more than time.tolerance = {tolerance}: lower it"),
-            false => String::new(),
-        };
-        (missed == misses).then(|| {
-            format!(
-                "{} steps chosen: the time error of the damage is about {} of it{advice}",
-                self.last.record.step,
-                percent(error)
-            )
-        })
+            self.damage_error.filter(|error| counts && (*error > tolerance || error.is_nan()))?;
+        Some(format!(
+            "the time steps cause an error of the damage of about {}, above time.tolerance = {tolerance}; set a lower one \
+             (explain accuracy)",
+            percent(error)
+        ))
     }
 }
 
@@ -150,7 +152,7 @@ fn large_gradients(body: &Body, u: &[f64]) -> Option<String> {
     (part > NOTICEABLE).then(|| {
         format!(
             "|∇u| exceeds {LARGE} in {:.0} % of the body: strains or rotations are too large \
-             for linear elasticity; if that is not meant, check the units of loads and moduli",
+             for linear elasticity; check the units of loads and moduli (explain large-rotation)",
             100.0 * part
         )
     })

@@ -172,21 +172,15 @@ impl BoundViolation {
         let sides = [("above", self.above), ("below", self.below)].into_iter();
         let sides = sides.filter(|(_, by)| *by > MAX_BALANCE);
         let sides: Vec<String> = sides.map(|(side, by)| format!("{side} by {by:.1e}")).collect();
-        let cure = match mass {
-            Mass::Consistent if self.k * slowest < 1.0 => {
-                "in a step the damage diffuses less far than a triangle is wide (κk < h²), where the consistent \
-                 mass overshoots; set damage.mass = \"lumped\" (for meshes without obtuse angles), or refine the \
-                 mesh there"
-            }
-            Mass::Lumped => "the mesh has obtuse angles, for which the lumped mass fails",
-            Mass::Consistent => {
-                "not because of the mass, as κk > h²: the mesh has obtuse angles, or the damage equation \
-                 is solved too inaccurately (zeta_error in history.csv)"
-            }
+        let cure = if mass == Mass::Consistent && self.k * slowest < 1.0 {
+            "the steps are so short that ζ diffuses less far than a triangle is wide (κk < h²); set damage.mass = \
+             \"lumped\" (for meshes without obtuse angles), or refine the mesh"
+        } else {
+            "the mesh has obtuse angles, or the damage equation is solved too inaccurately (zeta_error in history.csv)"
         };
         Some(format!(
-            "ζ left the bounds of the damage equation, {}, first in step {step} (t = {time:.4e}): \
-             {cure}",
+            "ζ left the range that the damage law allows, {}, first in step {step} (t = {time:.4e}): {cure} \
+             (explain stop)",
             sides.join(" and ")
         ))
     }

@@ -53,8 +53,8 @@ impl Mesh {
         let at = format!("at {}", self.place(self.nodes[*a]));
         let which = if names.is_empty() { at } else { format!("of {}", names.join(", ")) };
         Some(format!(
-            "the mesh has no geometry: the sides {which} are taken as chords of smooth curves through their nodes; \
-             mesh at order 2 if their shape is another"
+            "the mesh has no geometry: the sides {which} are taken as smooth curves through their nodes; mesh with \
+             elements of order 2 if this is not their shape"
         ))
     }
 }

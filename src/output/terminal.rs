@@ -37,7 +37,7 @@ pub fn with_bar(value: f64, bar: Option<f64>) -> String {
     let exponent = |number: f64| number.abs().log10().floor() as i32;
     let bar = bar.filter(|bar| *bar > 0.0 && bar.is_finite() && value.is_finite());
     let Some(bar) = bar else { return plain(value, 7) };
-    if bar > value.abs() && value != 0.0 {
+    if bar > value.abs() {
         return format!("{} ± {}", plain(value, 2), plain(bar, 2));
     }
     let of_both = exponent(value.abs().max(bar));

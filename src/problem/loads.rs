@@ -102,7 +102,7 @@ impl Loads {
             };
             format!(
                 "the {name} changes too sharply within the mesh's {elements} to be integrated: {part} may be \
-                 missed; refine the mesh where it changes"
+                 missed; refine the mesh where it changes (explain loads)"
             )
         };
         body.chain(surface).filter(|(.., missed)| *missed > NOTED).map(note).collect()

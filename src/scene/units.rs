@@ -59,8 +59,8 @@ impl Units {
         let ratio = quotient(&self.force, &self.length)? - stress;
         (ratio != 0).then(|| {
             format!(
-                "units: {0}/{1}² is 1e{ratio} {2}, so stresses and moduli in {0}/{1}² are no {2}; [units] only \
-                 names them, nothing is converted",
+                "units: {0}/{1}² is 1e{ratio} {2}, so stresses and moduli in {0}/{1}² are not in {2}; [units] only \
+                 names units and converts nothing (explain large-rotation)",
                 self.force, self.length, self.stress
             )
         })

@@ -7,7 +7,7 @@ use std::{f64::consts::FRAC_PI_2, process::Stdio, thread::sleep, time::Duration}
 fn an_accuracy_is_reached_and_its_mesh_is_kept() {
     let test_directory = TestDirectory::new();
     let said = test_directory.run(&["--accuracy", "0.05", "--out", "out/first"]);
-    assert!(said.out.contains("accuracy 0.05 reached: P2 on "), "{}", said.out);
+    assert!(said.out.contains("accuracy 0.05 reached"), "{}", said.out);
     let first = test_directory.summary("out/first");
     assert_eq!(first["reached"], true);
     let error = first["errors"]["displacement_mesh"].as_f64().unwrap();
@@ -121,9 +121,10 @@ const PUSHED: &str = "
 #[test]
 fn a_stress_that_is_zero_needs_no_finer_mesh_and_a_singular_one_is_told() {
     let directory = TestDirectory::new();
-    for (corner, told) in
-        [("[1, 1]", "accuracy 0.02 reached"), ("[0, 0]", "von Mises 32 Pa: singular")]
-    {
+    for (corner, told) in [
+        ("[1, 1]", "accuracy 0.02 reached"),
+        ("[0, 0]", "von Mises stress at corner 32 Pa: singular"),
+    ] {
         let probe = format!("probe = [{{ name = 'corner', point = {corner} }}]");
         directory.write("scene.toml", &format!("{PUSHED}\n{probe}"));
         let said = directory.run(&["--accuracy", "0.02"]);
@@ -132,9 +133,11 @@ fn a_stress_that_is_zero_needs_no_finer_mesh_and_a_singular_one_is_told() {
         assert!(triangles < 20_000, "{corner}: {triangles} triangles");
     }
     let said = directory.run(&["--accuracy", "0.02", "--accuracy-of", "von_mises_max,work"]);
-    let told =
-        "NOT reached (von_mises_max changes with every finer mesh, as a singular stress does";
-    assert!(said.out.contains(told), "{}", said.out);
+    for told in
+        ["NOT reached", "von_mises_max changes with every finer mesh, as a singular stress does"]
+    {
+        assert!(said.out.contains(told), "{}", said.out);
+    }
 }
 
 /// Below its threshold λ_W the damage rests. A singular stress exceeds every threshold on a mesh that is fine enough, a
@@ -156,7 +159,7 @@ fn a_sound_body_with_a_singular_stress_is_told_and_no_other() {
     {
         directory.write("scene.toml", &format!("{scene}\n{}", damage(threshold)));
         let said = directory.run(&[]);
-        let note = "no damage on this mesh, but the stress is singular";
+        let note = "so that damage may begin there on finer meshes";
         assert_eq!(said.out.contains(note), told, "{scene}, {threshold}: {}", said.out);
     }
 }
@@ -568,7 +571,7 @@ fn after_a_stop_the_errors_are_those_of_its_time_alone() {
             }
             let told = format!("{}{}", said.out, summary["notes"]);
             assert!(!told.contains("error of the damage"), "{told}");
-            assert!(told.contains("from the time steps: the time of ζ_* off by up to"), "{told}");
+            assert!(told.contains("from the time steps: time of ζ_* "), "{told}");
         }
     }
 }
@@ -602,7 +605,7 @@ fn meshes_beyond_the_limits_of_memory_and_time_are_not_begun() {
     ] {
         let said = asked("0.0003", &[option, limit]);
         let summary = directory.summary("out/scene");
-        assert!(said.out.contains("NOT reached (") && said.out.contains(option), "{}", said.out);
+        assert!(said.out.contains("NOT reached") && said.out.contains(option), "{}", said.out);
         assert_eq!(summary["reached"], false);
         let (force, bar) = force();
         assert_eq!(bar.is_some(), is_measured, "{option} {limit}: {}", said.out);

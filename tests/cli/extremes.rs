@@ -91,8 +91,9 @@ fn the_extreme_of_the_whole_is_that_of_the_part_in_which_it_lies() {
         assert_eq!(barred > 0, !options.is_empty(), "{options:?}: {barred} bars");
 
         // The screen and the history show the same pressures.
-        let pressures: Vec<&str> = said.out.split("largest pressure ").skip(1).collect();
-        let shown = |i: usize| pressures[i].lines().next().unwrap().trim();
+        let pressures: Vec<&str> = said.out.split("largest contact pressure ").skip(1).collect();
+        let line = |i: usize| pressures[i].lines().next().unwrap();
+        let shown = |i: usize| line(i).trim_start_matches("of near ").trim_start_matches("of far ");
         assert!([1, 2].iter().any(|&i| shown(i) == shown(0)), "{}", said.out);
         for name in ["near.pressure_max", "far.pressure_max"] {
             let history = *directory.column("out/scene", name).last().unwrap();
@@ -142,8 +143,9 @@ fn a_pressure_on_few_nodes_or_under_a_kink_is_not_resolved_and_a_smooth_one_is()
             let kink = found["singular"].as_str().filter(|reason| reason.starts_with(KINK));
             let reason = found["unresolved"].as_str().or(kink.map(|_| KINK));
             assert_eq!(reason, expected, "{context}");
-            let line = said.out.lines().find(|line| line.contains("largest pressure")).unwrap();
-            let shown = line.split("largest pressure ").nth(1).unwrap();
+            let line =
+                said.out.lines().find(|line| line.contains("largest contact pressure")).unwrap();
+            let shown = line.split("largest contact pressure ").nth(1).unwrap();
             let number = shown.split([' ', 'e']).next().unwrap().trim_start_matches(['0', '.']);
             let digits = number.trim_end_matches('0').replace('.', "").len();
             let ending = [": not resolved", ": singular"][usize::from(kink.is_some())];

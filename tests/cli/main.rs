@@ -26,5 +26,6 @@ mod odd_names;
 mod provenance;
 mod refused;
 mod restart;
+mod screen;
 mod serve;
 mod view;

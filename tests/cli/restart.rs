@@ -132,11 +132,11 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
     };
     restart(
         &["--set", "material.young=81"],
-        "the scene, its tables, --set, --solver or PETSc's options are others",
+        "the scene, its tables, --set, --solver or PETSc's options have changed",
     );
     let mesh = directory.read("square.msh");
     directory.write("square.msh", &mesh.replace("0.25 0.25 0\n", "0.26 0.25 0\n"));
-    restart(&[], "the mesh is another");
+    restart(&[], "the mesh has changed");
     directory.write("square.msh", &mesh);
     let content = fs::read(&path).expect("the checkpoint");
     let mut damaged = content.clone();
@@ -144,7 +144,7 @@ fn what_is_no_checkpoint_of_this_run_is_refused() {
     for (wrong, reason) in [
         (&damaged[..], "it is damaged"),
         (&content[..content.len() - 1], "it is damaged"),
-        (&content[..25], "it is cut off"),
+        (&content[..25], "the file is cut off"),
         (b"another file", "it is no checkpoint of this version"),
     ] {
         fs::write(&path, wrong).expect("mine");

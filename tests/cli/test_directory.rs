@@ -181,7 +181,12 @@ impl ProgramOutput {
         // On a busy machine a run is long enough to tell how far it is.
         let err = text(output.stderr);
         let err = err.split_inclusive('\n').filter(|line| !line.contains(" % after ")).collect();
-        let said = Self { code: output.status.code(), out: text(output.stdout), err };
+        // A long fact of the screen goes on in further lines.
+        let mut out = text(output.stdout);
+        if out.contains("\n  mesh  ") {
+            out = out.replace(&format!("\n{}", " ".repeat(18)), " ");
+        }
+        let said = Self { code: output.status.code(), out, err };
         assert!(!said.err.contains("panicked"), "{}", said.err);
         assert!(!said.out.contains('\x1b') && !said.err.contains('\x1b'), "escape codes: {said:?}");
         said

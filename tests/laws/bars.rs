@@ -177,7 +177,7 @@ fn contact_between_the_nodes_is_found_and_noted() {
     assert_eq!(given.last.record.active_nodes, 0);
     let problem = ObservedProblem::new(roller(), square(10)).unwrap();
     let notes = given.notes(&problem).join("\n");
-    assert!(notes.contains("between its nodes boundary \"bottom\""), "{notes}");
+    assert!(notes.contains("between its nodes, boundary \"bottom\""), "{notes}");
     let exact = figures(&solved(roller(), adapted(&roller(), square(10), 0.01).mesh));
     assert!(exact[2] > 0.25 * 0.05, "the roller carries {}", exact[2]);
     for accuracy in [0.1, 0.03] {

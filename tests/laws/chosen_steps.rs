@@ -240,19 +240,17 @@ fn the_error_of_two_step_differences_is_estimated_within_0_8_and_1_25_of_it() {
 }
 
 #[test]
-fn the_note_of_a_run_tells_its_steps_and_their_error() {
+fn steps_that_miss_their_tolerance_are_noted() {
     let scene = bent(10.0, "step = 'auto', tolerance = 0.01");
-    let (steps, outcome) = history(&scene, SOLVERS[0]);
+    let mut outcome = history(&scene, SOLVERS[0]).1;
     let error = outcome.damage_error.unwrap();
     assert!(0.0 < error && error < 0.01, "{error}");
-    let notes = outcome.remarks(&scene);
-    let told = format!("{} steps chosen", steps.len() - 1);
-    assert!(notes.iter().any(|note| note.contains(&told)), "{notes:?}");
-    // A tolerance that its steps miss is told.
-    let mut missed = outcome;
-    missed.damage_error = Some(0.02);
-    let notes = missed.notes(&scene);
-    assert!(notes.iter().any(|note| note.contains("lower it")), "{notes:?}");
+    for (error, is_noted) in [(error, false), (0.02, true)] {
+        outcome.damage_error = Some(error);
+        let notes = outcome.notes(&scene);
+        let noted = notes.iter().any(|note| note.contains("set a lower one"));
+        assert_eq!(noted, is_noted, "{notes:?}");
+    }
     let uniform = history(&bent(10.0, "step = 0.1"), SOLVERS[0]).1;
     assert_eq!(uniform.damage_error, None);
 }

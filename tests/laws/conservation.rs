@@ -97,7 +97,10 @@ fn the_loss_of_damage_in_a_run_is_the_integral_of_the_source() {
         }
         assert!(steps.iter().all(|step| step.record.zeta_error < 1e-12), "{set}");
         let notes = outcome.notes(&scene);
-        (steps.last().unwrap().record.zeta_mean, notes.iter().any(|note| note.contains("bounds")))
+        (
+            steps.last().unwrap().record.zeta_mean,
+            notes.iter().any(|note| note.contains("ζ left the range")),
+        )
     };
     for set in ["damage.mass=consistent", "damage.mass=lumped", "discretisation.displacement=2"] {
         mean(set);

@@ -78,11 +78,7 @@ fn a_body_balanced_on_one_point_or_on_its_edge_is_noted() {
             let mut notes = outcome.notes(&problem);
             notes.retain(|note| !note.contains("gave the answer"));
             assert_eq!(notes.len(), 1, "{solver}: {notes:?}");
-            assert!(
-                notes[0].starts_with("at t = 1, no active contact node supports"),
-                "{}",
-                notes[0]
-            );
+            assert!(notes[0].starts_with("no contact force acts against"), "{}", notes[0]);
             assert!(notes[0].contains(&format!("the rotation about {pivot}")), "{}", notes[0]);
         }
     }
@@ -120,8 +116,5 @@ fn a_note_is_given_once_with_how_often_and_when() {
     let problem = problem(square(10), text).unwrap();
     let notes = run(&problem, SOLVERS[0]).notes(&problem);
     // Without load, at t = 0, the body rests.
-    assert!(
-        notes.len() == 1 && notes[0].starts_with("in 4 steps, at t = 0.25 first and t = 1 last,"),
-        "{notes:?}"
-    );
+    assert!(notes.len() == 1 && notes[0].contains("in 4 steps (t = 0.25 to 1)"), "{notes:?}");
 }

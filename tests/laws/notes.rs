@@ -156,7 +156,7 @@ fn curved_sides_that_order_1_does_not_follow_are_noted() {
         );
         let mesh = bent(&square(2), |[x, y]| [x, y + 0.1 * x * x]);
         let notes = problem(mesh, &text).unwrap_or_else(|e| panic!("{e}")).notes();
-        let noted = notes.iter().any(|note| note.contains("curved sides count as straight"));
+        let noted = notes.iter().any(|note| note.contains("curved sides are taken as straight"));
         assert_eq!(noted, told, "{notes:?}");
     }
 }
@@ -168,7 +168,10 @@ fn steps_by_another_solver_are_noted() {
     assert!(outcome.rescued.is_none() && outcome.remarks(&problem).is_empty());
     outcome.rescued = Some((1, "tao".to_owned()));
     let [note] = &outcome.notes(&problem)[..] else { panic!("one note") };
-    assert_eq!(note, "in 1 step the solver missed the tolerance and tao gave the answer");
+    assert_eq!(
+        note,
+        "in 1 step the contact solver missed its tolerance, and tao gave the answer (explain solvers)"
+    );
 }
 
 #[test]
@@ -216,7 +219,7 @@ fn what_is_odd_in_a_scene_is_noted_and_nothing_else() {
         (units("kN/cm^2"), "N/mm² is 1e-1 kN/cm^2"),
         (units("N/mm^2"), ""),
         (units("psi"), ""),
-        (clamped(damage), "[damage] without [time]"),
+        (clamped(damage), "[damage] has no effect without [time]"),
         // A pulse between two steps, and waves of the length of a step.
         (loaded("if(t > 0.301 and t < 0.302, -4, 0)"), "change within a time step"),
         (loaded("-4*sin(50*pi*t)^2"), "change within a time step"),

@@ -67,7 +67,7 @@ impl ContactSolver for ActiveSet {
                 return Ok(report);
             }
         }
-        let detail = "the active set still changes";
+        let detail = "the set of nodes in contact still changes";
         Err(ContactError::stopped(self.name, report, Kkt::UNKNOWN, detail))
     }
 }

@@ -125,8 +125,8 @@ impl FixedPoint<'_> {
         }
         let tolerance = problem.tolerance;
         let detail = format!(
-            "the tolerance {tolerance:.1e} is missed by contact pressures {missed:.1e} ({:.1e} times what it \
-             allows them) (ω = {omega:.3e})",
+            "the tolerance {tolerance:.1e} is missed by contact pressures, whose residual {missed:.1e} is \
+             {:.1e} times too large (ω = {omega:.3e})",
             missed / (EXACT * tolerance)
         );
         Err(ContactError::stopped(PENALTY_DUALITY.name, *report, Kkt::UNKNOWN, detail))
@@ -212,7 +212,7 @@ fn solve_condensed(
             elastic.factorise(system)?;
         }
     }
-    let detail = "the forces that the small problem leaves do not get small enough";
+    let detail = "the forces that the condensed problem leaves over do not become small enough";
     Err(ContactError::stopped(PENALTY_DUALITY.name, report, Kkt::UNKNOWN, detail))
 }
 

@@ -44,18 +44,18 @@ impl Accuracy {
         let (displacement, time) = (self.displacement, self.time);
         let support = match (displacement, self.gave_up) {
             (f64::INFINITY, Some(reason)) => Some(format!(
-                "at t = {time:.4e}, PETSc's KSP ended with {reason} above its tolerance: the error of the \
-                 displacements cannot be estimated; change the options -elastic_ksp_… and -elastic_pc_…"
+                "the error of the displacements at t = {time:.4e} is unknown, as PETSc's KSP ended with {reason} above its \
+                 tolerance; change the options -elastic_ksp_… and -elastic_pc_… (explain petsc-options)"
             )),
             (f64::INFINITY, None) => Some(format!(
-                "at t = {time:.4e}, the active contact nodes alone do not support the body: the error of \
-                 the displacements cannot be estimated"
+                "the error of the displacements at t = {time:.4e} is unknown, as the nodes in contact do not support the \
+                 body (explain collapse)"
             )),
             _ => (displacement > Self::promised(tolerance)).then(|| {
                 format!(
                     "the stiffness is ill-conditioned (a slender or very soft part?): displacements \
                      at t = {time:.4e} are exact only to about {displacement:.0e} of the largest, \
-                     although the residuals are small"
+                     although the residuals are small (explain solvers)"
                 )
             }),
         };
@@ -63,7 +63,7 @@ impl Accuracy {
             format!(
                 "the mesh is too coarse: strains jump between triangles by about {:.0} % (energy \
                  norm), and displacements may be far too small; use smaller or less stretched \
-                 triangles, several across a part that bends",
+                 triangles, several across a part that bends (explain accuracy)",
                 100.0 * self.energy
             )
         });
