@@ -185,7 +185,10 @@ fn a_study_reports_killed_cases_and_stops_on_a_signal() {
     signal(study.id(), "INT");
     let ended = study.wait_with_output().expect("it ends");
     let err = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert!(ended.status.code() == Some(130) && err.starts_with("stopped; the same"), "{err}");
+    assert!(
+        ended.status.code() == Some(130) && err.starts_with("stopped; run the same command"),
+        "{err}"
+    );
     let summary = directory.summary(case);
     assert!(summary["error"].as_str().is_some_and(|e| e.contains("SIGINT")), "{summary}");
     assert!(directory.has_checkpoint(case, 1), "the case is saved");
